@@ -219,17 +219,21 @@ TEST(JointFit, IsPulledByWhatIsNoBeadWithTheBoundAtMost) {
   EXPECT_NEAR(step_with(unseen_level, 0.4), 0, 1e-6);
 }
 
+GrayFrame shown_by(const ProfileTable& table, const std::vector<ModelDisk>& disks, int width, int height) {
+  return frame_by(width, height, [&](int column, int row) {
+    double sum = 0;
+    for (const ModelDisk& disk : disks) sum += level_of(table, disk.x, disk.y, column, row);
+    return sum;
+  });
+}
+
 // Three beads in a row that blur makes share pixels, all moved by something else: two steps together leave a hundredth
 // of it, for their coupling is known.
 TEST(JointFit, TakesCoupledBeadsTogether) {
   constexpr double radius = 5, edge = 1.6;
   const ProfileTable table(test::blurred_profile(radius, edge, 10.5), radius, edge, 0);
   const std::vector<ModelDisk> truth = {model_at(18, 19), model_at(25.2, 25.9), model_at(35.1, 24.6)};
-  const GrayFrame flat = frame_by(55, 45, [&](int column, int row) {
-    double sum = 0;
-    for (const ModelDisk& disk : truth) sum += level_of(table, disk.x, disk.y, column, row);
-    return sum;
-  });
+  const GrayFrame flat = shown_by(table, truth, 55, 45);
   JointFit fit(flat);
   fit.set_table(&table);
   std::vector<ModelDisk> disks = truth;
@@ -287,11 +291,7 @@ TEST(JointFit, CouplesABeadBesideOneThatRests) {
   constexpr double radius = 5, edge = 1.6;
   const ProfileTable table(test::blurred_profile(radius, edge, 10.5), radius, edge, 0);
   const std::vector<ModelDisk> truth = {model_at(32, 14), model_at(16, 22), model_at(38.6, 22.2)};
-  const GrayFrame flat = frame_by(56, 40, [&](int column, int row) {
-    double sum = 0;
-    for (const ModelDisk& disk : truth) sum += level_of(table, disk.x, disk.y, column, row);
-    return sum;
-  });
+  const GrayFrame flat = shown_by(table, truth, 56, 40);
   JointFit fit(flat);
   fit.set_table(&table);
   std::vector<ModelDisk> disks = truth;

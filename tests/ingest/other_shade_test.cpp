@@ -112,7 +112,7 @@ TEST(OtherShade, HasItsContrastOnUnevenGround) {
   EXPECT_EQ(seen, 6U);
 }
 
-// Smaller beads of the other shade keep their own radius, which is told.
+// Smaller beads of the other shade keep their own radius, and a warning states it.
 TEST(OtherShade, OfAnotherSizeHasItsRadius) {
   const BedOfShades bed(6, 7);
   ShadesFound shades = first_shade(bed);

@@ -228,7 +228,7 @@ TEST(RadiusVote, CountsAsItsRulesSay) {
   }
 }
 
-// The spacing of nine circles is not told, that of ten is: rows of five, 14 px apart, or of four and five.
+// The spacing of nine circles is not known, that of ten is: rows of five, 14 px apart, or of four and five.
 TEST(RadiusVote, KnowsTheSpacingOfTenCircles) {
   for (const int count : {9, 10}) {
     Camera camera;

@@ -24,7 +24,7 @@ class StageMistakes : public testing::Test {
     write_text(folder_ / "q.csv", "height,number_density,std_error\n1,1,0.1\n2,0.5,0.1\n3,0.2,0.1\n");
   }
   // What is wrong with a recipe of these stages; "" where nothing is.
-  std::string told(const std::string& stages) {
+  std::string said_of(const std::string& stages) {
     std::vector<Problem> problems;
     auto document = parse_json(R"({ "name": "t", "stages": [ )" + stages + " ] }", "r.json", problems);
     if (!document) return "no JSON: " + problems.at(0).what;
@@ -57,40 +57,41 @@ std::string bed(const std::string& more, const std::string& id = "bed", const st
 // --- simulate
 
 TEST_F(StageMistakes, OfWhatABedIsToObserve) {
-  EXPECT_EQ(told(bed(shaken + R"(, "observe": ["order", "pressure"])")), "");
-  EXPECT_EQ(told(bed(shaken + R"(, "observe": ["ordr"])")),
+  EXPECT_EQ(said_of(bed(shaken + R"(, "observe": ["order", "pressure"])")), "");
+  EXPECT_EQ(said_of(bed(shaken + R"(, "observe": ["ordr"])")),
             "/stages/0/observe: \"ordr\" is not one of the additional measurements. Did you mean \"order\"?");
-  EXPECT_EQ(told(bed(shaken + R"(, "observe": ["zzzzz"])")),
+  EXPECT_EQ(said_of(bed(shaken + R"(, "observe": ["zzzzz"])")),
             "/stages/0/observe: \"zzzzz\" is not one of the additional measurements. Choose from: order, velocities, "
             "displacement, pressure, phases, species");
-  EXPECT_THAT(told(bed(shaken + R"(, "observe": ["species"])")),
+  EXPECT_THAT(said_of(bed(shaken + R"(, "observe": ["species"])")),
               StartsWith("/stages/0/observe: \"species\" needs two different species of disks. Give \"disks\""));
-  EXPECT_THAT(told(bed(R"("gravity": 0, "start_temperature": 1, "observe": ["pressure"])", "bed", "40",
-                       R"("sides": "periodic", "lid": { "kind": "periodic", "height": 20 })")),
+  EXPECT_THAT(said_of(bed(R"("gravity": 0, "start_temperature": 1, "observe": ["pressure"])", "bed", "40",
+                          R"("sides": "periodic", "lid": { "kind": "periodic", "height": 20 })")),
               StartsWith("/stages/0/observe: \"pressure\" is the pressure as a function of height, but the box is "
                          "periodic upwards. Leave it out"));
 }
 
 TEST_F(StageMistakes, OfASchedule) {
-  EXPECT_EQ(told(bed(warmed + R"(, "schedule": [ { "temperature": 2, "ramp": 1 }, { "temperature": 1, "hold": 1 } ])")),
-            "");
-  EXPECT_EQ(told(bed(warmed + R"(, "schedule": [ { "temperature": 2, "ramp": 1 }, { "temperature": 1 } ])")),
+  EXPECT_EQ(
+      said_of(bed(warmed + R"(, "schedule": [ { "temperature": 2, "ramp": 1 }, { "temperature": 1, "hold": 1 } ])")),
+      "");
+  EXPECT_EQ(said_of(bed(warmed + R"(, "schedule": [ { "temperature": 2, "ramp": 1 }, { "temperature": 1 } ])")),
             "/stages/0/schedule/1: the step has no duration. Give \"ramp\" or \"hold\"");
-  EXPECT_EQ(told(bed(shaken + R"(, "schedule": [ { "temperature": 2, "ramp": 1 } ])")),
+  EXPECT_EQ(said_of(bed(shaken + R"(, "schedule": [ { "temperature": 2, "ramp": 1 } ])")),
             "/stages/0/schedule: \"schedule\" changes the temperature of a bath, and this bed has no bath with a "
             "temperature. Give a \"bath\": langevin, andersen or thermal_floor");
 }
 
 // A period of the floor is 2. 20 periods of 32 phases are 640 moments.
 TEST_F(StageMistakes, OfTheTimeAndItsFrames) {
-  EXPECT_EQ(told(bed(shaken, "bed", "2")), "");
-  EXPECT_THAT(told(bed(shaken, "bed", "1.99")),
+  EXPECT_EQ(said_of(bed(shaken, "bed", "2")), "");
+  EXPECT_THAT(said_of(bed(shaken, "bed", "1.99")),
               StartsWith("/stages/0/measure: the bed must be measured over at least one period of the floor. Give "));
-  EXPECT_EQ(told(bed(shaken, "bed", "1.9e12")), "");
-  EXPECT_EQ(told(bed(shaken, "bed", "2.1e12")),
+  EXPECT_EQ(said_of(bed(shaken, "bed", "1.9e12")), "");
+  EXPECT_EQ(said_of(bed(shaken, "bed", "2.1e12")),
             "/stages/0/measure: the floor would shake more than 1e12 times, which no run can reach. Give a shorter "
             "\"measure\" or \"settle\", or a lower frequency");
-  const auto frames = [&](const std::string& keys) { return told(bed(shaken + ", \"frames\": { " + keys + " }")); };
+  const auto frames = [&](const std::string& keys) { return said_of(bed(shaken + ", \"frames\": { " + keys + " }")); };
   EXPECT_EQ(frames(R"("count": 640, "phases": 32)"), "");
   EXPECT_EQ(frames(R"("count": 641, "phases": 32)"),
             "/stages/0/frames/count: 641 frames were requested, but the bed is sampled at only 640 moments. Give a "
@@ -101,23 +102,24 @@ TEST_F(StageMistakes, OfTheTimeAndItsFrames) {
       "1/4 from 0 to below 1";
   for (const char* at : {"[0, 0.3]", "[0.5, 0.5]", "[1]", "[-0.25]"})
     EXPECT_EQ(frames(R"("count": 8, "phases": 4, "at": )" + std::string(at)), phases) << at;
-  EXPECT_EQ(told(bed(warmed + R"(, "frames": { "count": 8, "at": [0] })")),
+  EXPECT_EQ(said_of(bed(warmed + R"(, "frames": { "count": 8, "at": [0] })")),
             "/stages/0/frames/at: the floor does not shake, so frames have no phases. Remove \"at\"");
 }
 
 // In reduced units advice is a plain number, as every time in the recipe is.
 TEST_F(StageMistakes, HaveAdviceInTheUnitsOfTheRecipe) {
-  EXPECT_EQ(told(bed(shaken, "bed", "1")),
+  EXPECT_EQ(said_of(bed(shaken, "bed", "1")),
             "/stages/0/measure: the bed must be measured over at least one period of the floor. Give 2 or more");
-  EXPECT_EQ(told(R"({ "stage": "simulate", "disks": { "count": 40, "diameter": "3 mm" }, "box": { "width": "30.9 mm" },
+  EXPECT_EQ(
+      said_of(R"({ "stage": "simulate", "disks": { "count": 40, "diameter": "3 mm" }, "box": { "width": "30.9 mm" },
       "settle": "1 s", "measure": "0.1 s", "floor": { "motion": "sinusoidal", "gamma": 4, "frequency": "3 Hz" } })"),
-            "/stages/0/measure: the bed must be measured over at least one period of the floor. Give 0.3334 s or more");
+      "/stages/0/measure: the bed must be measured over at least one period of the floor. Give 0.3334 s or more");
 }
 
 // Four beds where a shaken floor meets beads that dissipate below an open lid, else one.
 TEST_F(StageMistakes, AreNoneWhereReplicasAreLeftOut) {
   const auto replicas = [&](const std::string& stages) {
-    EXPECT_EQ(told(stages), "");
+    EXPECT_EQ(said_of(stages), "");
     return plan_.stages.back().options.value("replicas", 0);
   };
   EXPECT_EQ(replicas(bed(shaken)), 4);
@@ -132,7 +134,7 @@ TEST_F(StageMistakes, AreNoneWhereReplicasAreLeftOut) {
 
 TEST_F(StageMistakes, OfScenes) {
   const auto scene = [&](const std::string& more, const std::string& box = R"("sides": "periodic")") {
-    return told(bed(more, "bed", "40", box));
+    return said_of(bed(more, "bed", "40", box));
   };
   EXPECT_THAT(scene(R"("floor": { "motion": "sinusoidal", "amplitude": 1, "gamma": 4, "frequency": 0.5 })"),
               HasSubstr("both \"amplitude\" and \"gamma\" are given, but each follows from the other"));
@@ -159,7 +161,7 @@ TEST_F(StageMistakes, OfScenes) {
 
 TEST_F(StageMistakes, OfAFit) {
   const std::string own = R"("profile": "p.csv")";
-  const auto fit = [&](const std::string& keys) { return told(R"({ "stage": "fit", )" + keys + " }"); };
+  const auto fit = [&](const std::string& keys) { return said_of(R"({ "stage": "fit", )" + keys + " }"); };
   EXPECT_EQ(fit(own), "");
   EXPECT_EQ(fit(own + R"(, "bootstrap": 10)"),
             "/stages/0/bootstrap: there are no frames to resample: no extract or simulate stage in \"from\"");
@@ -186,7 +188,7 @@ TEST_F(StageMistakes, OfAFit) {
 
 TEST_F(StageMistakes, OfAFitOfBeds) {
   const std::string three = bed(shaken, "a") + ", " + bed(shaken, "b") + ", " + bed(shaken, "c") + ", ";
-  const auto fit = [&](const std::string& keys) { return told(three + R"({ "stage": "fit", )" + keys + " }"); };
+  const auto fit = [&](const std::string& keys) { return said_of(three + R"({ "stage": "fit", )" + keys + " }"); };
   EXPECT_EQ(fit(R"("from": ["a", "b"], "temperature_measured": true, "bootstrap": 5)"), "");
   EXPECT_EQ(fit(R"("from": ["a", "b", "c"])"), "/stages/3/from: only the model simulation reads more than two stages");
   EXPECT_EQ(fit(R"("from": ["a", "b", "c"], "model": "simulation")"), "");
@@ -204,7 +206,7 @@ class InferMistakes : public StageMistakes {
   std::string with(const Json& more) {
     Json stage = Json::parse(infer_recipe)["stages"][0];
     stage.update(more);
-    return told(stage.dump());
+    return said_of(stage.dump());
   }
   std::string targets(const Json& more) { return with({{"targets", more}}); }
 };
@@ -299,7 +301,7 @@ TEST_F(StageMistakes, OfExpectations) {
   const std::string map =
       R"({ "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 }, )";
   const auto expect = [&](const std::string& keys) {
-    return told(map + R"({ "stage": "check", "from": "map", "expect": { "/map/diameter": { )" + keys + " } } }");
+    return said_of(map + R"({ "stage": "check", "from": "map", "expect": { "/map/diameter": { )" + keys + " } } }");
   };
   EXPECT_EQ(expect(R"("value": "3 mm", "absolute": "0.1 mm")"), "");
   EXPECT_EQ(expect(R"("value": "3 mm", "absolute": 0.1)"),
@@ -316,7 +318,7 @@ TEST_F(StageMistakes, OfExpectations) {
 
 TEST_F(StageMistakes, OfClaims) {
   const auto claim = [&](const std::string& keys) {
-    return told(
+    return said_of(
         R"({ "stage": "fit", "profile": "p.csv" }, { "stage": "claims", "from": "fit", "claims": [ { "claim": "c",
       "number": "/fit/temperature")" +
         keys + " } ] }");
@@ -330,11 +332,11 @@ TEST_F(StageMistakes, OfClaims) {
 }
 
 TEST_F(StageMistakes, OfMapsAndPictures) {
-  EXPECT_EQ(told(R"({ "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10,
+  EXPECT_EQ(said_of(R"({ "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10,
                       "table": ["p.csv", "q.csv"] })"),
             "/stages/0/table: this names 2 files, but the stage reads one table. Give the path of one CSV file");
   const auto render = [&](const std::string& keys, const std::string& frames) {
-    return told(bed(shaken + frames) + R"(, { "stage": "render", "from": "bed", )" + keys + " }");
+    return said_of(bed(shaken + frames) + R"(, { "stage": "render", "from": "bed", )" + keys + " }");
   };
   const std::string some = R"(, "frames": { "count": 4 })";
   EXPECT_EQ(render(R"("background_level": 100, "bead_level": 101)", some), "");
@@ -348,8 +350,9 @@ TEST_F(StageMistakes, OfMapsAndPictures) {
 
 TEST_F(StageMistakes, OfWhatAStudyMayRun) {
   const auto study = [&](const std::string& stages) {
-    return told(R"({ "stage": "study", "stages": [ )" + stages +
-                R"( ], "parameter": { "values": [1], "set": [] }, "collect": { "t": { "at": "/f/temperature" } } })");
+    return said_of(
+        R"({ "stage": "study", "stages": [ )" + stages +
+        R"( ], "parameter": { "values": [1], "set": [] }, "collect": { "t": { "at": "/f/temperature" } } })");
   };
   EXPECT_THAT(study(R"({ "stage": "fit", "id": "f", "profile": ")" + (folder_ / "p.csv").string() + "\" }"),
               HasSubstr("the stage \"f\" reads a file, which a chain of a study cannot do. Put it after the study"));
