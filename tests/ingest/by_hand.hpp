@@ -12,6 +12,7 @@
 #include "ingest/find/blurred_disk.hpp"
 #include "ingest/find/find_disks.hpp"
 #include "ingest/frames/frames.hpp"
+#include "ingest/synthetic/synthetic_frames.hpp"
 
 namespace shakebed::ingest::test {
 
@@ -77,6 +78,15 @@ inline FoundDisk found_at(double x, double y, double radius = 10) {
 inline bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 inline bool any_holds(const std::vector<std::string>& texts, const std::string& part) {
   return std::any_of(texts.begin(), texts.end(), [&](const std::string& text) { return holds(text, part); });
+}
+
+// 150 x 122 px: beads of one level on a ground of 150, blurred by 0.8 px.
+inline GrayFrame beads_of_level(const std::vector<RenderedDisk>& disks, double level, double noise = 2) {
+  Camera camera;
+  camera.width = 150, camera.height = 122;
+  camera.background_level = 150, camera.bead_level = level;
+  camera.blur_px = 0.8, camera.read_noise = noise;
+  return render_frame(disks, camera);
 }
 
 }  // namespace shakebed::ingest::test

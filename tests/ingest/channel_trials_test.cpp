@@ -18,13 +18,6 @@ std::vector<RenderedDisk> beads_of_trial() {
                      17 + 28.0 * (k / 5) + 5 * test::scattered(k / 5 + 9, k % 5), 9, 0, 0});
   return disks;
 }
-GrayFrame channel_of_trial(const std::vector<RenderedDisk>& disks, double level, double noise = 2) {
-  Camera camera;
-  camera.width = 150, camera.height = 122;
-  camera.background_level = 150, camera.bead_level = level;
-  camera.blur_px = 0.8, camera.read_noise = noise;
-  return render_frame(disks, camera);
-}
 
 // A frame that was reduced by `by`, in whose red channel these beads were seen, dark.
 struct TrialFrames {
@@ -34,8 +27,8 @@ struct TrialFrames {
   TrialFrames(const std::vector<RenderedDisk>& in_red, const std::vector<RenderedDisk>& in_green, double green,
               int by = 1) {
     frames.reduction = by, frames.width = 150 * by, frames.height = 122 * by;
-    frames.channels = {{Channel::red, channel_of_trial(in_red, 70)},
-                       {Channel::green, channel_of_trial(in_green, green)}};
+    frames.channels = {{Channel::red, test::beads_of_level(in_red, 70)},
+                       {Channel::green, test::beads_of_level(in_green, green)}};
     best.channel = Channel::red, best.rims.radius_px = 9 * by, best.rims.polarity = Polarity::dark_beads;
     for (const RenderedDisk& disk : in_red) {
       RimDisk rim;

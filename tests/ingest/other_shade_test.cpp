@@ -26,19 +26,12 @@ struct BedOfShades {
           .push_back({17 + 28.0 * column + 6 * test::scattered(column, row),
                       17 + 28.0 * row + 6 * test::scattered(row + 9, column), is_bright ? bright_radius : 9, 0, 0});
     }
-    const GrayFrame others = seen(bright, bright_level, 0), none = seen({}, 70, 0);
-    of_dark = seen(dark, 70, 2);
+    const GrayFrame others = test::beads_of_level(bright, bright_level, 0), none = test::beads_of_level({}, 70, 0);
+    of_dark = test::beads_of_level(dark, 70, 2);
     for (std::size_t k = 0; k < of_dark.pixels.size(); ++k)
       of_dark.pixels[k] += static_cast<float>(slope * static_cast<double>(k % 150));
     frame = of_dark;
     for (std::size_t k = 0; k < frame.pixels.size(); ++k) frame.pixels[k] += others.pixels[k] - none.pixels[k];
-  }
-  static GrayFrame seen(const std::vector<RenderedDisk>& disks, double level, double noise) {
-    Camera camera;
-    camera.width = 150, camera.height = 122;
-    camera.background_level = 150, camera.bead_level = level;
-    camera.blur_px = 0.8, camera.read_noise = noise;
-    return render_frame(disks, camera);
   }
 };
 
