@@ -312,6 +312,7 @@ class Engine final : public Simulation {
   void tell_pressed(double step) const;
   bool chatters();
   bool is_cold() const;
+  bool lands_soft() const { return Rule::spins && floor_falls_; }  // a cold bed
   void keep_stretches();
   std::vector<PressedBed::Stretch> stretches_by_place() const;
   double spin_now(std::uint32_t i) const { return is_pressed_ ? pressed_.spin_at(i, now_ - pressed_to_) : spins_[i]; }
@@ -436,8 +437,8 @@ class Engine final : public Simulation {
   double counted_since_ = 0;
   std::uint64_t contacts_when_counted_ = 0;
   bool chatters_ = false, pressed_in_interval_ = false;
-  bool floor_falls_ = false;  // faster than rough disks do, once a period
-  double floor_speed_ = 0;    // at most, under rough disks
+  bool floor_falls_ = false;  // faster than disks do, once a period
+  double floor_speed_ = 0;    // at most
   std::vector<PressedBed::Stretch> stretches_;
 
   // --- bookkeeping

@@ -43,9 +43,9 @@ inline constexpr double chattering = 0.6, chattering_on = 0.04;
 // hard disks and go on pressed are too cold by two.
 inline constexpr double cold = 0.02, chattering_of_cold = 0.02;
 inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
-// How far rough beds move against the floor in a contact time [D], at most: they harden as soon as their springs hold
-// little. Beds of 24 to 45 rows that had softened while they lay there, and were shaken up again, were compressed by up
-// to 0.02 D.
+// How far beds move against the floor in a contact time [D], at most: they harden as soon as their springs hold
+// little. Rough beds of 24 to 45 rows that had softened while they lay there, and were shaken up again, were compressed
+// by up to 0.02 D, smooth ones of 40 to 60 rows by 0.012 D, and T_x was up to twice too large.
 inline constexpr double landing_travel = 2e-3;
 // What springs that are still compressed may gain thereby, a check: of disks in flight [m g D], each; of the kinetic
 // energy against the floor.
@@ -84,13 +84,11 @@ void Engine<Space, Rule, Sizes>::plan_press(bool wanted) {
     pressed_.set_up({width_, Space::wraps_x ? width_ : 0, lid_height_},
                     {disk_surface_, side_surface_, floor_surface_, lid_surface_},
                     Rule::spins ? inverse_inertia_ratio_ : 0);
-    if constexpr (Rule::spins) {
-      constexpr int moments = 256;
-      for (int k = 0; k < moments; ++k) {
-        const FloorMotion::Motion floor = floor_.motion(floor_.period() * k / moments);
-        floor_falls_ = floor_falls_ || gravity_ + floor.acceleration < 0;
-        floor_speed_ = std::max(floor_speed_, std::abs(floor.velocity));
-      }
+    constexpr int moments = 256;
+    for (int k = 0; k < moments; ++k) {
+      const FloorMotion::Motion floor = floor_.motion(floor_.period() * k / moments);
+      floor_falls_ = floor_falls_ || gravity_ + floor.acceleration < 0;
+      floor_speed_ = std::max(floor_speed_, std::abs(floor.velocity));
     }
   }
 }
@@ -266,7 +264,7 @@ void Engine<Space, Rule, Sizes>::soften_pressed() {
     if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
   }
   if (contact_time <= press_contact_time_) return;
-  press_contact_time_ = std::min(contact_time, (floor_falls_ ? softening_of_rough : softening) * press_contact_time_);
+  press_contact_time_ = std::min(contact_time, (lands_soft() ? softening_of_rough : softening) * press_contact_time_);
   pressed_.soften(press_contact_time_);
 }
 
@@ -300,7 +298,7 @@ void Engine<Space, Rule, Sizes>::adapt_contact_time(bool stays) {
 // Sleeps, wakes, softens or ends, by what the bed does. After a step.
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::check_press(const FloorMotion::Motion& floor) {
-  const bool stays = floor_falls_ && pressed_.side_temperature() < cold;
+  const bool stays = lands_soft() && pressed_.side_temperature() < cold;
   adapt_contact_time(stays);
   const double weight = floor.acceleration + gravity_;
   if (weight >= 0 || pressed_.floor_force() != 0) {

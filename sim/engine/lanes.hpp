@@ -111,6 +111,14 @@ inline bool any_of(LaneMask mask) {
   return (mask[0] | mask[1] | mask[2] | mask[3]) != 0;
 #endif
 }
+// Also where some are -0.
+inline bool all_negative(Lanes value) {
+#if defined(__AVX__)
+  return _mm256_movemask_pd(value) == 15;
+#else
+  return std::signbit(value[0]) && std::signbit(value[1]) && std::signbit(value[2]) && std::signbit(value[3]);
+#endif
+}
 inline Lanes sqrt_lanes(Lanes value) {
 #if defined(__AVX__)
   return _mm256_sqrt_pd(value);

@@ -11,14 +11,11 @@ namespace shakebed::sim {
 
 namespace {
 
-using State = PressedBed::State;
-
-constexpr double disk_radius = 0.5, skin = 0.08;  // of neighbours beyond contact [D]; a pressed bed hardly changes any
-constexpr std::size_t sentinels = 2;              // behind the last disk, for lists of whole blocks of pairs
-constexpr double far_off = -100;                  // where they are: they touch nothing
-// A pair is asked until the next check if it would touch within so many times that many steps at the speed it has, or
-// at that which is usual.
-constexpr double foresight = 6;
+constexpr double disk_radius = 0.5;
+// How far beyond contact two disks are neighbours, and a disk and a wall [D]. The next neighbours but one of a packing
+// are much farther away.
+constexpr double skin = 0.15, wall_skin = 0.04;
+constexpr double far_off = -100;  // of the disks that touch nothing, one from the next
 // By how much more than its overlap a pair is moved apart: rows that fill the box come apart in a tenth of the sweeps.
 constexpr double overdone = 1.6;
 
@@ -44,43 +41,49 @@ double share_lost(double damping, double steps) {
   return 1 - sum / moments;
 }
 
-// Differences of four pairs, second less first.
-struct Differences {
-  Lanes x, z, vx, vz;
-};
-Lanes state_at(const State* disks, std::uint32_t place) {
-  Lanes state;
-  std::memcpy(&state, reinterpret_cast<const char*>(disks) + place, sizeof state);
-  return state;
+// Four numbers side by side, anywhere.
+[[gnu::always_inline]] inline Lanes four_at(const double* numbers) {
+  Lanes lanes;
+  std::memcpy(&lanes, numbers, sizeof lanes);
+  return lanes;
 }
-[[gnu::always_inline]] inline Differences differences(const State* disks, const std::uint32_t* i,
-                                                      const std::uint32_t* k) {
-  const Lanes d0 = state_at(disks, k[0]) - state_at(disks, i[0]), d1 = state_at(disks, k[1]) - state_at(disks, i[1]),
-              d2 = state_at(disks, k[2]) - state_at(disks, i[2]), d3 = state_at(disks, k[3]) - state_at(disks, i[3]);
-  const Lanes a01 = __builtin_shufflevector(d0, d1, 0, 4, 2, 6), b01 = __builtin_shufflevector(d0, d1, 1, 5, 3, 7);
-  const Lanes a23 = __builtin_shufflevector(d2, d3, 0, 4, 2, 6), b23 = __builtin_shufflevector(d2, d3, 1, 5, 3, 7);
-  return {__builtin_shufflevector(a01, a23, 0, 1, 4, 5), __builtin_shufflevector(b01, b23, 0, 1, 4, 5),
-          __builtin_shufflevector(a01, a23, 2, 3, 6, 7), __builtin_shufflevector(b01, b23, 2, 3, 6, 7)};
+[[gnu::always_inline]] inline void put_four(double* numbers, Lanes lanes) {
+  std::memcpy(numbers, &lanes, sizeof lanes);
 }
-// Of {x, z} alone, of which one disk has `numbers_a_disk` on.
-struct TwoDifferences {
-  Lanes x, z;
-};
-template <std::size_t numbers_a_disk>
-[[gnu::always_inline]] inline TwoDifferences differences_of_two(const double* numbers, const std::uint32_t* i,
-                                                                const std::uint32_t* k) {
-  const auto at = [&](std::uint32_t place) { return &numbers[numbers_a_disk * (place / sizeof(State))]; };
-  const Lanes d02 = two_pairs(at(k[0]), at(k[2])) - two_pairs(at(i[0]), at(i[2]));
-  const Lanes d13 = two_pairs(at(k[1]), at(k[3])) - two_pairs(at(i[1]), at(i[3]));
-  return {__builtin_shufflevector(d02, d13, 0, 4, 2, 6), __builtin_shufflevector(d02, d13, 1, 5, 3, 7)};
+// Of four pairs at once: from the first disks, to the second. Five disks in a row: what has just been written is not
+// read again, which would have to wait.
+template <bool in_row>
+[[gnu::always_inline]] inline void exchange(double* numbers, const PairBlock& pair, Lanes amount) {
+  double *const first = numbers + pair.first, *const second = numbers + pair.second;
+  if constexpr (in_row) {
+    put_four(first, four_at(first) + (__builtin_shufflevector(amount, Lanes{}, 4, 0, 1, 2) - amount));
+    first[PressedRows::lanes] += amount[3];
+  } else {
+    put_four(first, four_at(first) - amount);
+    put_four(second, four_at(second) + amount);
+  }
+}
+// The same amount to both.
+template <bool in_row>
+[[gnu::always_inline]] inline void add_to_both(double* numbers, const PairBlock& pair, Lanes amount) {
+  double *const first = numbers + pair.first, *const second = numbers + pair.second;
+  if constexpr (in_row) {
+    put_four(first, four_at(first) + (__builtin_shufflevector(amount, Lanes{}, 4, 0, 1, 2) + amount));
+    first[PressedRows::lanes] += amount[3];
+  } else {
+    put_four(first, four_at(first) + amount);
+    put_four(second, four_at(second) + amount);
+  }
+}
+[[gnu::always_inline]] inline Lanes difference(const double* numbers, const PairBlock& pair) {
+  return four_at(numbers + pair.second) - four_at(numbers + pair.first);
 }
 Lanes nearest_image(Lanes dx, double period) {
   const Lanes large = all_lanes(0x1.8p52);
   return fused(all_lanes(-period), fused(dx, all_lanes(1 / period), large) - large, dx);
 }
+double largest_of(Lanes lanes) { return std::max(std::max(lanes[0], lanes[1]), std::max(lanes[2], lanes[3])); }
 double sum_of(Lanes lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
-
-std::uint32_t place_of(std::uint32_t i) { return i * static_cast<std::uint32_t>(sizeof(State)); }
 
 }  // namespace
 
@@ -147,42 +150,48 @@ void PressedBed::soften(double contact_time) {
     pair_.damping *= std::max(1.0, std::min(contact_time / dashpot_time, most_damping / damping));
 }
 
+auto PressedBed::numbers() -> Numbers {
+  return {x_.data(),         z_.data(),           vx_.data(),       vz_.data(),        halfway_x_.data(),
+          halfway_z_.data(), force_x_.data(),     force_z_.data(),  dashpot_x_.data(), dashpot_z_.data(),
+          rim_.data(),       rim_halfway_.data(), rim_force_.data()};
+}
+
 void PressedBed::begin(std::vector<State> disks, const FloorMotion::Motion& floor, double contact_time,
                        const std::vector<double>& spins, const std::vector<Stretch>& stretches) {
-  disks_ = std::move(disks);
-  count_ = static_cast<std::uint32_t>(disks_.size());
-  halfway_.assign(2 * (std::size_t{count_} + sentinels), 0);
-  for (std::uint32_t i = 0; i < count_; ++i) put_pair(&halfway_[2 * i], pair_at(&disks_[i].vx));
-  last_step_ = 0;
-  disks_.push_back({far_off, far_off, 0, 0});
-  disks_.push_back({2 * far_off, 2 * far_off, 0, 0});
-  force_.assign(4 * disks_.size(), 0);
-  floor_work_ = damped_ = usual_approach_ = 0;
+  count_ = static_cast<std::uint32_t>(disks.size());
+  const std::size_t lanes = PressedRows::lanes, places = (count_ + 2 * lanes - 1) / lanes * lanes;
+  for (auto* numbers : {&x_, &z_, &vx_, &vz_, &halfway_x_, &halfway_z_, &force_x_, &force_z_, &dashpot_x_, &dashpot_z_,
+                        &rim_, &rim_halfway_, &rim_force_})
+    numbers->assign(places, 0);
+  disk_of_.resize(count_);
+  place_of_.resize(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    disk_of_[i] = place_of_[i] = i;
+    x_[i] = disks[i].x;
+    z_[i] = disks[i].z;
+    halfway_x_[i] = vx_[i] = disks[i].vx;
+    halfway_z_[i] = vz_[i] = disks[i].vz;
+  }
+  for (std::size_t i = count_; i < places; ++i) x_[i] = z_[i] = far_off * static_cast<double>(i - count_ + 1);
+  for (std::size_t i = 0; i < spins.size(); ++i) rim_[i] = rim_halfway_[i] = disk_radius * spins[i];
+  if (rough_) wall_stretch_.assign(std::size_t{walls} * count_, 0);
+  stretch_.clear();
+  last_step_ = floor_work_ = damped_ = 0;
   fastest_ = mean_square_speed_ = side_temperature_ = never;
   soften(contact_time);
-  if (rough_) {
-    rim_.assign(std::size_t{count_} + sentinels, 0);
-    for (std::size_t i = 0; i < spins.size(); ++i) rim_[i] = disk_radius * spins[i];
-    rim_halfway_ = rim_;
-    rim_force_.assign(std::size_t{count_} + sentinels, 0);
-    wall_stretch_.assign(std::size_t{walls} * count_, 0);
-    stretch_.clear();
-    first_.clear();
-    second_.clear();
-  }
-  list_pairs(floor.position);
-  if (rough_) {
-    kept_ = stretches;
-    place_stretches(kept_);
-  }
+  list_neighbours();
+  list_walls(floor.position, 0);
+  if (rough_) place_stretches(stretches);
+  until_check_ = steps_a_check;
   add_forces(floor);
   damped_ = rubbed_;  // of springs that were stretched farther than friction allows
 }
 
-auto PressedBed::at(std::uint32_t i, double later) const -> State {
-  const TwoLanes a = pair_at(&force_[4 * i]) + TwoLanes{0, -1};
-  const TwoLanes v = fused(both(0.5 * last_step_), a, pair_at(&halfway_[2 * i]));
-  const TwoLanes place = fused(both(later), fused(both(0.5 * later), a, v), pair_at(&disks_[i].x));
+auto PressedBed::at(std::uint32_t disk, double later) const -> State {
+  const std::uint32_t i = place_of_[disk];
+  const TwoLanes a = {force_x_[i], force_z_[i] - 1};
+  const TwoLanes v = fused(both(0.5 * last_step_), a, TwoLanes{halfway_x_[i], halfway_z_[i]});
+  const TwoLanes place = fused(both(later), fused(both(0.5 * later), a, v), TwoLanes{x_[i], z_[i]});
   const TwoLanes velocity = fused(both(later), a, v);
   return {place[0], place[1], velocity[0], velocity[1]};
 }
@@ -191,178 +200,79 @@ auto PressedBed::at(std::uint32_t i, double later) const -> State {
 // neighbours
 
 TwoLanes PressedBed::gap_of(std::uint32_t i, std::uint32_t k) const {
-  TwoLanes d = pair_at(&disks_[k].x) - pair_at(&disks_[i].x);
+  TwoLanes d = {x_[k] - x_[i], z_[k] - z_[i]};
   if (box_.period > 0) d[0] -= box_.period * std::nearbyint(d[0] / box_.period);
   return d;
 }
 
-// All pairs within the skin, by columns of disks in the order of height.
-void PressedBed::list_pairs(double floor) {
-  const double reach = 2 * disk_radius + skin;
-  const auto columns = static_cast<std::size_t>(std::max(1.0, std::floor(box_.width / reach)));
-  std::vector<std::vector<std::uint32_t>> column(columns);
-  listed_.resize(2 * std::size_t{count_});
-  if (rough_) keep_stretches();
-  first_.clear();
-  second_.clear();
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    State& disk = disks_[i];
-    if (box_.period > 0) disk.x -= box_.period * std::floor(disk.x / box_.period);
-    put_pair(&listed_[2 * i], pair_at(&disk.x) - TwoLanes{0, floor});
-    const double at =
-        std::clamp(disk.x / box_.width * static_cast<double>(columns), 0.0, static_cast<double>(columns - 1));
-    column[static_cast<std::size_t>(at)].push_back(i);
+// New places for the disks, along their rows, and all pairs within the skin.
+void PressedBed::list_neighbours() {
+  const std::vector<Stretch> kept = rough_ && !stretch_.empty() ? pair_stretches() : std::vector<Stretch>{};
+  if (box_.period > 0) {
+    for (std::uint32_t i = 0; i < count_; ++i) x_[i] -= box_.period * std::floor(x_[i] / box_.period);
   }
-  const auto lower = [this](std::uint32_t a, std::uint32_t b) { return disks_[a].z < disks_[b].z; };
-  for (auto& one : column) std::stable_sort(one.begin(), one.end(), lower);
-  for (std::size_t c = 0; c < columns; ++c) {
-    for (std::size_t other : {c, c + 1}) {
-      if (other == columns && !(box_.period > 0)) continue;
-      const auto& beside = column[other % columns];
-      std::size_t from = 0;
-      for (const std::uint32_t i : column[c]) {
-        while (from < beside.size() && disks_[beside[from]].z < disks_[i].z - reach) ++from;
-        for (std::size_t o = from; o < beside.size() && disks_[beside[o]].z < disks_[i].z + reach; ++o) {
-          const std::uint32_t k = beside[o];
-          if (other == c && k <= i) continue;
-          const TwoLanes d = gap_of(i, k);
-          if (!(d[0] * d[0] + d[1] * d[1] < reach * reach)) continue;
-          first_.push_back(place_of(i));
-          second_.push_back(place_of(k));
-        }
-      }
-    }
+  rows_.find(x_, z_, count_, box_.width, box_.period, 2 * disk_radius + skin);
+  const std::vector<std::uint32_t>& order = rows_.order();
+  const auto permute = [&order](auto& numbers, auto& before) {
+    before.assign(numbers.begin(), numbers.end());
+    for (std::size_t place = 0; place < order.size(); ++place) numbers[place] = before[order[place]];
+  };
+  for (auto* numbers : {&x_, &z_, &vx_, &vz_, &halfway_x_, &halfway_z_, &force_x_, &force_z_, &dashpot_x_, &dashpot_z_})
+    permute(*numbers, permuted_);
+  if (rough_) {
+    for (auto* numbers : {&rim_, &rim_halfway_, &rim_force_}) permute(*numbers, permuted_);
   }
-  interleave();
-  if (rough_) place_stretches(kept_);
-  list_walls(floor);
-  until_check_ = steps_a_check;
+  permute(disk_of_, place_of_);
+  listed_x_ = x_;
+  listed_z_ = z_;
+  for (std::uint32_t i = 0; i < count_; ++i) place_of_[disk_of_[i]] = i;
+  if (rough_) place_stretches(kept);
 }
 
-// Pairs of one disk stand apart: the sum of its forces need not wait for the pair before. And whole blocks of four.
-void PressedBed::interleave() {
-  constexpr std::size_t parts = 16;
-  const std::size_t pairs = first_.size(), part = (pairs + parts - 1) / parts;
-  in_contact_ = 0;
-  active_first_.clear();
-  active_second_.clear();
-  for (std::size_t k = 0; k < part; ++k) {
-    for (std::size_t q = k; q < pairs; q += part) {
-      active_first_.push_back(first_[q]);
-      active_second_.push_back(second_[q]);
-    }
-  }
-  while (active_first_.size() % 4 != 0) {
-    active_first_.push_back(place_of(count_));
-    active_second_.push_back(place_of(count_ + 1));
-  }
-  first_ = active_first_;
-  second_ = active_second_;
-}
-
-void PressedBed::list_walls(double floor) {
-  const double near = disk_radius + skin / 2;
+// margin: how far a disk moves until the next check.
+void PressedBed::list_walls(double floor, double margin) {
+  const double near = disk_radius + std::max(wall_skin, 2 * margin);
   for (auto* list : {&near_left_, &near_right_, &near_floor_, &near_lid_}) list->clear();
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const State& disk = disks_[i];
-    if (!(box_.period > 0) && disk.x < near) near_left_.push_back(i);
-    if (!(box_.period > 0) && disk.x > box_.width - near) near_right_.push_back(i);
-    if (disk.z - floor < near) near_floor_.push_back(i);
-    if (disk.z > box_.lid - near - 2 * skin) near_lid_.push_back(i);  // places are listed above the floor, which moves
+    if (z_[i] - floor < near) near_floor_.push_back(i);
+    if (z_[i] > box_.lid - near) near_lid_.push_back(i);
+    if (box_.period > 0) continue;
+    if (x_[i] < near) near_left_.push_back(i);
+    if (x_[i] > box_.width - near) near_right_.push_back(i);
   }
-}
-
-// Of all neighbours those that may touch before the next check, and those whose tangential springs are stretched, so
-// that these are let go. Smooth ones in contact come first.
-template <bool rough>
-void PressedBed::choose_active(double dt) {
-  const double ahead = foresight * steps_a_check * dt, margin = ahead * usual_approach_;
-  const std::size_t pairs = first_.size();
-  const Lanes contact = all_lanes(4 * disk_radius * disk_radius);
-  active_first_.resize(pairs + 8);
-  active_second_.resize(pairs + 8);
-  if constexpr (rough) active_.resize(pairs + 8);
-  apart_.resize(pairs + 1);
-  std::size_t active = 0, apart = 0;
-  Lanes approaches{};
-  for (std::size_t p = 0; p < pairs; p += 4) {
-    Differences d = differences(disks_.data(), &first_[p], &second_[p]);
-    if (box_.period > 0) d.x = nearest_image(d.x, box_.period);
-    const Lanes squared = fused(d.x, d.x, d.z * d.z), closing = fused(d.x, d.vx, d.z * d.vz);
-    const LaneMask near = fused(all_lanes(-2 * margin), all_lanes(1), squared) < contact;
-    const LaneMask comes = fused(all_lanes(2 * ahead), closing, squared) < contact;
-    LaneMask asked = near | comes;
-    if constexpr (rough) {
-      Lanes stretch;
-      std::memcpy(&stretch, &stretch_[p], sizeof stretch);
-      asked |= stretch != Lanes{};
-    }
-    approaches += closing * closing;
-    const LaneMask ahead_of_others = rough ? asked : squared < contact;
-    for (std::size_t q = 0; q < 4; ++q) {
-      active_first_[active] = first_[p + q];
-      active_second_[active] = second_[p + q];
-      if constexpr (rough) active_[active] = static_cast<std::uint32_t>(p + q);
-      apart_[apart] = static_cast<std::uint32_t>(p + q);
-      active += static_cast<std::size_t>(ahead_of_others[q] & 1);
-      apart += static_cast<std::size_t>(asked[q] & ~ahead_of_others[q] & 1);
-    }
-  }
-  const auto fill_block = [&] {
-    for (; active % 4 != 0; ++active) {
-      active_first_[active] = place_of(count_);
-      active_second_[active] = place_of(count_ + 1);
-      if constexpr (rough) active_[active] = static_cast<std::uint32_t>(pairs);  // of no pair
-    }
-  };
-  fill_block();
-  in_contact_ = active;
-  for (std::size_t k = 0; k < apart; ++k, ++active) {
-    active_first_[active] = first_[apart_[k]];
-    active_second_[active] = second_[apart_[k]];
-  }
-  fill_block();
-  active_first_.resize(active);
-  active_second_.resize(active);
-  usual_approach_ = std::sqrt(sum_of(approaches) / static_cast<double>(std::max<std::size_t>(pairs, 1)));
 }
 
 // ------------------------------------------------------------------------------------------------
 // tangential springs
 
-// Stretched springs of pairs, before these are listed anew.
-void PressedBed::keep_stretches() {
-  kept_.clear();
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    if (stretch_[p] != 0) kept_.push_back({disk_at(first_[p]), disk_at(second_[p]), stretch_[p]});
-  }
+auto PressedBed::pair_stretches() const -> std::vector<Stretch> {
+  std::vector<Stretch> all;
+  each_neighbour([&](std::uint32_t i, std::uint32_t k, std::size_t lane) {
+    if (stretch_[lane] != 0) all.push_back({disk_of_[i], disk_of_[k], stretch_[lane]});
+  });
+  return all;
 }
 
-// Where the pairs now stand. Those of walls stay with their disks.
-void PressedBed::place_stretches(std::vector<Stretch>& stretches) {
-  const auto key = [](std::uint32_t a, std::uint32_t b) {
-    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+// Those of walls stay with their disks.
+void PressedBed::place_stretches(std::vector<Stretch> stretches) {
+  const auto key = [](const Stretch& one) {
+    return std::uint64_t{std::min(one.disk, one.other)} << 32 | std::max(one.disk, one.other);
   };
-  const auto less = [&key](const Stretch& a, const Stretch& b) { return key(a.disk, a.other) < key(b.disk, b.other); };
+  const auto less = [&key](const Stretch& a, const Stretch& b) { return key(a) < key(b); };
   std::sort(stretches.begin(), stretches.end(), less);
-  stretch_.assign(first_.size() + 1, 0);
-  active_.resize(first_.size());
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    active_[p] = static_cast<std::uint32_t>(p);
-    const Stretch wanted{disk_at(first_[p]), disk_at(second_[p]), 0};
+  stretch_.assign(PressedRows::lanes * rows_.blocks().size(), 0);
+  each_neighbour([&](std::uint32_t i, std::uint32_t k, std::size_t lane) {
+    const Stretch wanted{disk_of_[i], disk_of_[k], 0};
     const auto found = std::lower_bound(stretches.begin(), stretches.end(), wanted, less);
-    if (found != stretches.end() && !less(wanted, *found)) stretch_[p] = found->stretch;
-  }
+    if (found != stretches.end() && !less(wanted, *found)) stretch_[lane] = found->stretch;
+  });
   for (const Stretch& one : stretches) {
     if (one.other >= count_) wall_stretch_[walls * one.disk + one.other - count_] = one.stretch;
   }
 }
 
 auto PressedBed::stretches() const -> std::vector<Stretch> {
-  std::vector<Stretch> all;
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    if (stretch_[p] != 0) all.push_back({disk_at(first_[p]), disk_at(second_[p]), stretch_[p]});
-  }
+  std::vector<Stretch> all = pair_stretches();
   for (std::uint32_t i = 0; i < wall_stretch_.size(); ++i) {
     if (wall_stretch_[i] != 0) all.push_back({i / walls, count_ + i % walls, wall_stretch_[i]});
   }
@@ -394,150 +304,147 @@ void PressedBed::let_go() {
   return {force, -force * way - 0.5 * grip.stiffness * (stretch * stretch - before * before)};
 }
 
-// Four numbers of disks, in the order of their places.
-[[gnu::always_inline]] inline Lanes numbers_at(const double* numbers, const std::uint32_t* places) {
-  const auto at = [&](int q) { return numbers[places[q] / sizeof(State)]; };
-  return Lanes{at(0), at(1), at(2), at(3)};
-}
 [[gnu::always_inline]] inline Lanes clamped(Lanes value, Lanes most) {
   return select(value < -most, -most, select(most < value, most, value));
 }
 
 // The same of four pairs.
-[[gnu::always_inline]] inline auto PressedBed::pull(Lanes stretch, Lanes slip, Lanes slipped, Lanes normal_force) const
-    -> PulledLanes {
-  const Lanes stiffness = all_lanes(pair_.grip.stiffness), damping = all_lanes(pair_.grip.damping);
-  const Lanes most = all_lanes(pair_.grip.friction) * larger(normal_force, Lanes{});
-  const Lanes way = slipped * all_lanes(slip_time_), now = clamped(stretch + way, most / stiffness);
-  const Lanes force = clamped(-stiffness * now - damping * slip, most);
-  return {force, now, -force * way - all_lanes(0.5) * stiffness * (now * now - stretch * stretch)};
-}
-
-template <bool periodic>
-void PressedBed::add_rough_pair_forces() {
-  double squares = 0, count = 0, rubbed = 0;
-  const State* const disks = disks_.data();
-  const double *const halfway = halfway_.data(), *const rim = rim_.data(), *const rim_halfway = rim_halfway_.data();
-  double *const forces = force_.data(), *const rim_forces = rim_force_.data(), *const stretch = stretch_.data();
-  const double spin_up = inverse_inertia_ratio_, half_stiffness = 0.5 * pair_.grip.stiffness;
-  const Lanes one = all_lanes(1), stiffness = all_lanes(pair_.stiffness), damping = all_lanes(pair_.damping);
-  const std::size_t active = active_first_.size();
-  const std::uint32_t *i = active_first_.data(), *k = active_second_.data(), *pairs = active_.data();
-  for (const std::uint32_t* const end = i + active; i != end; i += 4, k += 4, pairs += 4) {
-    Differences d = differences(disks, i, k);
-    if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
-    const Lanes squared = d.x * d.x + d.z * d.z;
-    const LaneMask touch = squared < one;
-    const Lanes before = {stretch[pairs[0]], stretch[pairs[1]], stretch[pairs[2]], stretch[pairs[3]]};
-    if (!any_of(touch | (before != Lanes{}))) continue;
-    const Lanes distance = sqrt_lanes(squared), nx = d.x / distance, nz = d.z / distance;
-    const TwoDifferences past = differences_of_two<2>(halfway, i, k);
-    const Lanes v = d.vx * nx + d.vz * nz, side = d.vz * nx - d.vx * nz, side_past = past.z * nx - past.x * nz;
-    const Lanes force = stiffness * (one - distance) - damping * v;
-    const PulledLanes pulled = pull(before, numbers_at(rim, i) + numbers_at(rim, k) - side,
-                                    numbers_at(rim_halfway, i) + numbers_at(rim_halfway, k) - side_past, force);
-    const Lanes fx = force * nx + pulled.force * nz, fz = force * nz - pulled.force * nx;
-    const Lanes lost = select(touch, pulled.lost, all_lanes(half_stiffness) * before * before);
-    const Lanes now = unless(~touch, pulled.stretch), spins = all_lanes(spin_up) * pulled.force, square = v * v;
-#pragma GCC unroll 4
-    for (int q = 0; q < 4; ++q) {
-      rubbed += lost[q];
-      stretch[pairs[q]] = now[q];
-      if (!touch[q]) continue;
-      const TwoLanes on_second = {fx[q], fz[q]};
-      const std::uint32_t first = disk_at(i[q]), second = disk_at(k[q]);
-      put_pair(forces + 4 * first, pair_at(forces + 4 * first) - on_second);
-      put_pair(forces + 4 * second, pair_at(forces + 4 * second) + on_second);
-      rim_forces[first] += spins[q];
-      rim_forces[second] += spins[q];
-      squares += square[q];
-      count += 1;
-    }
+struct PressedBed::LaneGrip {
+  Lanes stiffness, damping, friction, reach, time;  // reach: how far a normal force of 1 lets the spring be stretched
+  LaneGrip(const Grip& grip, double step)
+      : stiffness(all_lanes(grip.stiffness)),
+        damping(all_lanes(grip.damping)),
+        friction(all_lanes(grip.friction)),
+        reach(all_lanes(grip.friction > 0 ? grip.friction / grip.stiffness : 0)),
+        time(all_lanes(step)) {}
+  struct Pulled {
+    Lanes force, stretch, lost;
+  };
+  [[gnu::always_inline]] Pulled pull(Lanes stretch, Lanes slip, Lanes slipped, Lanes normal_force) const {
+    const Lanes pressed = larger(normal_force, Lanes{}), way = slipped * time;
+    const Lanes now = clamped(stretch + way, reach * pressed);
+    const Lanes force = clamped(-stiffness * now - damping * slip, friction * pressed);
+    return {force, now, -force * way - all_lanes(0.5) * stiffness * (now * now - stretch * stretch)};
   }
-  rubbed_ += rubbed;
-  touching_ = count;
-  pair_squares_ = squares;
+};
+
+template <bool periodic, bool in_row>
+void PressedBed::add_rough_pair_forces(const PairBlock* pair, const PairBlock* end) {
+  const bool counts = check_due();
+  const double period = box_.period;
+  Lanes squares{}, count{}, rubbed{};
+  const Lanes one = all_lanes(1), spring = all_lanes(0.5 * pair_.stiffness), damping = all_lanes(pair_.damping),
+              spin_up = all_lanes(inverse_inertia_ratio_), half_grip = all_lanes(0.5 * pair_.grip.stiffness);
+  const LaneGrip grip(pair_.grip, slip_time_);
+  const Numbers by = numbers();
+  double* stretch = stretch_.data() + PressedRows::lanes * (pair - rows_.blocks().data());
+  for (; pair != end; ++pair) {
+    Lanes dx = difference(by.x, *pair);
+    const Lanes dz = difference(by.z, *pair);
+    if constexpr (periodic) dx = nearest_image(dx, period);
+    const Lanes u = fused(-dx, dx, fused(-dz, dz, one)), before = four_at(stretch);
+    const LaneMask touch = u > Lanes{};
+    stretch += PressedRows::lanes;
+    if (!any_of(touch | (before != Lanes{}))) continue;
+    const Lanes vx = difference(by.vx, *pair), vz = difference(by.vz, *pair);
+    const Lanes past_x = difference(by.halfway_x, *pair), past_z = difference(by.halfway_z, *pair);
+    const Lanes v = fused(vx, dx, vz * dz), dashpot = unless(~touch, -(damping * v));
+    const Lanes force = unless(~touch, fused(spring, u, dashpot));
+    const auto rims = [pair](const double* rim) { return four_at(rim + pair->first) + four_at(rim + pair->second); };
+    const LaneGrip::Pulled pulled = grip.pull(before, rims(by.rim) - fused(vz, dx, -(vx * dz)),
+                                              rims(by.rim_halfway) - fused(past_z, dx, -(past_x * dz)), force);
+    const Lanes along = unless(~touch, pulled.force);
+    put_four(stretch - PressedRows::lanes, unless(~touch, pulled.stretch));
+    rubbed += select(touch, pulled.lost, half_grip * before * before);
+    exchange<in_row>(by.force_x, *pair, fused(force, dx, along * dz));
+    exchange<in_row>(by.force_z, *pair, fused(force, dz, -(along * dx)));
+    exchange<in_row>(by.dashpot_x, *pair, dashpot * dx);
+    exchange<in_row>(by.dashpot_z, *pair, dashpot * dz);
+    add_to_both<in_row>(by.rim_force, *pair, spin_up * along);
+    if (!counts) continue;
+    squares += unless(~touch, v * v);
+    count += unless(~touch, one);
+  }
+  rubbed_ += sum_of(rubbed);
+  touching_ += sum_of(count);
+  pair_squares_ += sum_of(squares);
 }
 
 // ------------------------------------------------------------------------------------------------
 
 void PressedBed::check(const FloorMotion::Motion& floor, double dt) {
   until_check_ = steps_a_check;
-  double farthest = 0, fastest = 0, squares = 0, side_squares = 0;
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    const TwoLanes moved = pair_at(&disks_[i].x) - TwoLanes{0, floor.position} - pair_at(&listed_[2 * i]);
-    const TwoLanes speed = pair_at(&disks_[i].vx) - TwoLanes{0, floor.velocity};
-    farthest = std::max(farthest, moved[0] * moved[0] + moved[1] * moved[1]);
-    double square = speed[0] * speed[0] + speed[1] * speed[1];
-    if (rough_) square += rim_[i] * rim_[i];
-    fastest = std::max(fastest, square);
+  constexpr LaneMask lane = {0, 1, 2, 3};
+  Lanes sum_x{}, sum_z{}, sum_vx{}, sum_vz{}, fastest{}, squares{}, side_squares{};
+  // Calls visit(first place, mask of the lanes without a disk).
+  const auto each_four = [&](auto visit) {
+    for (std::size_t i = 0; i < count_; i += PressedRows::lanes)
+      visit(i, lane >= static_cast<std::int64_t>(count_ - i));
+  };
+  const Lanes floor_speed = all_lanes(floor.velocity);
+  each_four([&](std::size_t i, LaneMask none) {
+    const Lanes vx = four_at(&vx_[i]), vz = four_at(&vz_[i]), rim = four_at(&rim_[i]), up = vz - floor_speed;
+    const Lanes side = unless(none, vx * vx), square = unless(none, side + up * up + rim * rim);
+    fastest = larger(fastest, square);
     squares += square;
-    side_squares += disks_[i].vx * disks_[i].vx;
-  }
-  fastest_ = std::sqrt(fastest);
-  mean_square_speed_ = squares / count_;
-  side_temperature_ = side_squares / count_;
-  if (std::sqrt(farthest) + steps_a_check * dt * fastest_ > 0.5 * skin) {
-    list_pairs(floor.position);
-  } else {
-    rough_ ? choose_active<true>(dt) : choose_active<false>(dt);
-  }
+    side_squares += side;
+    sum_vx += unless(none, vx);
+    sum_vz += unless(none, vz);
+    sum_x += unless(none, four_at(&x_[i]) - four_at(&listed_x_[i]));
+    sum_z += unless(none, four_at(&z_[i]) - four_at(&listed_z_[i]));
+  });
+  fastest_ = std::sqrt(largest_of(fastest));
+  mean_square_speed_ = sum_of(squares) / count_;
+  side_temperature_ = sum_of(side_squares) / count_;
+  // Against the mean of all: two disks approach by no more than twice of it.
+  const auto mean = [this](Lanes sum) { return all_lanes(sum_of(sum) / count_); };
+  const Lanes x = mean(sum_x), z = mean(sum_z), mean_vx = mean(sum_vx), mean_vz = mean(sum_vz);
+  Lanes farthest{}, fastest_of_all{};
+  each_four([&](std::size_t i, LaneMask none) {
+    const Lanes dx = four_at(&x_[i]) - four_at(&listed_x_[i]) - x, dz = four_at(&z_[i]) - four_at(&listed_z_[i]) - z;
+    const Lanes vx = four_at(&vx_[i]) - mean_vx, vz = four_at(&vz_[i]) - mean_vz;
+    farthest = larger(farthest, unless(none, dx * dx + dz * dz));
+    fastest_of_all = larger(fastest_of_all, unless(none, vx * vx + vz * vz));
+  });
+  const double ahead = steps_a_check * dt;
+  if (std::sqrt(largest_of(farthest)) + ahead * std::sqrt(largest_of(fastest_of_all)) > 0.5 * skin) list_neighbours();
+  list_walls(floor.position, ahead * fastest_);
 }
 
 // ------------------------------------------------------------------------------------------------
 // forces and steps
 
-template <bool periodic>
-void PressedBed::add_pair_forces() {
-  const std::size_t pairs = active_first_.size();
-  const State* const disks = disks_.data();
-  char* const force = reinterpret_cast<char*>(force_.data());
-  const Lanes stiffness = all_lanes(pair_.stiffness), damping = all_lanes(pair_.damping), one = all_lanes(1);
+template <bool periodic, bool in_row>
+void PressedBed::add_pair_forces(const PairBlock* pair, const PairBlock* end) {
+  const bool counts = check_due();
+  const double period = box_.period;
+  const Numbers by = numbers();
   Lanes squares{}, count{};
-  const auto add = [force](std::uint32_t first, std::uint32_t second, Lanes f) {
-    Lanes a, b;
-    std::memcpy(&a, force + first, sizeof a);
-    std::memcpy(&b, force + second, sizeof b);
-    a -= f, b += f;
-    std::memcpy(force + first, &a, sizeof a);
-    std::memcpy(force + second, &b, sizeof b);
-  };
-  for (std::size_t p = 0; p < pairs; p += 4) {
-    const std::uint32_t *i = &active_first_[p], *k = &active_second_[p];
-    if (p >= in_contact_) {
-      TwoDifferences d = differences_of_two<4>(&disks->x, i, k);
-      if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
-      if (!any_of(fused(d.x, d.x, d.z * d.z) < one)) continue;
-    }
-    Differences d = differences(disks, i, k);
-    if constexpr (periodic) d.x = nearest_image(d.x, box_.period);
-    const Lanes u = one - fused(d.x, d.x, d.z * d.z);  // 1 - r^2
-    const LaneMask touch = u > all_lanes(0);
-    // 1 - r and 1 / r of r = sqrt(1 - u), to 1e-10 for overlaps of 0.01 D
-    const Lanes overlap =
-        u * fused(u, fused(u, fused(u, all_lanes(5.0 / 128), all_lanes(1.0 / 16)), all_lanes(0.125)), all_lanes(0.5));
-    const Lanes inverse = fused(
-        u, fused(u, fused(u, fused(u, all_lanes(35.0 / 128), all_lanes(5.0 / 16)), all_lanes(0.375)), all_lanes(0.5)),
-        one);
-    const Lanes nx = d.x * inverse, nz = d.z * inverse, v = fused(d.vx, nx, d.vz * nz);
-    const Lanes dashpot = unless(~touch, -(damping * v)), f = unless(~touch, fused(stiffness, overlap, -(damping * v)));
-    squares += unless(~touch, v * v);
-    count += unless(~touch, one);
-    const Lanes fx = f * nx, fz = f * nz, dx = dashpot * nx, dz = dashpot * nz;
-    const Lanes f02 = __builtin_shufflevector(fx, fz, 0, 4, 2, 6), f13 = __builtin_shufflevector(fx, fz, 1, 5, 3, 7);
-    const Lanes d02 = __builtin_shufflevector(dx, dz, 0, 4, 2, 6), d13 = __builtin_shufflevector(dx, dz, 1, 5, 3, 7);
-    add(i[0], k[0], __builtin_shufflevector(f02, d02, 0, 1, 4, 5));
-    add(i[1], k[1], __builtin_shufflevector(f13, d13, 0, 1, 4, 5));
-    add(i[2], k[2], __builtin_shufflevector(f02, d02, 2, 3, 6, 7));
-    add(i[3], k[3], __builtin_shufflevector(f13, d13, 2, 3, 6, 7));
+  const Lanes one = all_lanes(1), spring = all_lanes(0.5 * pair_.stiffness), damping = all_lanes(pair_.damping);
+  for (; pair != end; ++pair) {
+    Lanes dx = difference(by.x, *pair);
+    const Lanes dz = difference(by.z, *pair);
+    if constexpr (periodic) dx = nearest_image(dx, period);
+    const Lanes u = fused(-dx, dx, fused(-dz, dz, one));  // 1 - r^2
+    if (all_negative(u)) continue;
+    const LaneMask apart = u <= Lanes{};
+    const Lanes v = fused(difference(by.vx, *pair), dx, difference(by.vz, *pair) * dz);
+    const Lanes dashpot = unless(apart, damping * v), force = unless(apart, fused(spring, u, -dashpot));
+    exchange<in_row>(by.force_x, *pair, force * dx);
+    exchange<in_row>(by.force_z, *pair, force * dz);
+    exchange<in_row>(by.dashpot_x, *pair, -(dashpot * dx));
+    exchange<in_row>(by.dashpot_z, *pair, -(dashpot * dz));
+    if (!counts) continue;
+    squares += unless(apart, v * v);
+    count += unless(apart, one);
   }
-  touching_ = sum_of(count);
-  pair_squares_ = sum_of(squares);
+  touching_ += sum_of(count);
+  pair_squares_ += sum_of(squares);
 }
 
-auto PressedBed::wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
-                            TwoLanes velocity) const -> WallContacts {
-  const TwoLanes along = inward * pair_at(&disks_[i].x), flow = inward * velocity;
+auto PressedBed::wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring) const
+    -> WallContacts {
+  const TwoLanes along = inward * TwoLanes{x_[i], z_[i]}, flow = inward * velocity_of(i);
   const double gap = along[0] + along[1] - place - disk_radius;
   if (!(gap < 0)) return {};
   const double v = flow[0] + flow[1] - speed;
@@ -549,22 +456,24 @@ auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, Wall wa
                                  double speed, const Spring& spring) -> WallContacts {
   WallContacts contacts;
   for (const std::uint32_t i : near) {
-    const WallContacts one = wall_force(i, inward, place, speed, spring, velocity_of(i));
-    put_pair(&force_[4 * i], fused(both(one.force), inward, pair_at(&force_[4 * i])));
+    const WallContacts one = wall_force(i, inward, place, speed, spring);
+    force_x_[i] += one.force * inward[0];
+    force_z_[i] += one.force * inward[1];
     contacts.force += one.force;
     contacts.lost += one.lost;
     if (!rough_ || !(spring.grip.friction > 0)) continue;
-    double& stretch = wall_stretch_[walls * i + wall];
+    double& stretch = wall_stretch_[walls * disk_of_[i] + wall];
     if (one.force == 0) {
       if (stretch != 0) rubbed_ += 0.5 * spring.grip.stiffness * stretch * stretch;
       stretch = 0;
       continue;
     }
     const TwoLanes tangent = {inward[1], -inward[0]};
-    const TwoLanes now = velocity_of(i) * tangent, past = pair_at(&halfway_[2 * i]) * tangent;
+    const TwoLanes now = velocity_of(i) * tangent, past = TwoLanes{halfway_x_[i], halfway_z_[i]} * tangent;
     const Pulled side =
         pull(stretch, spring.grip, now[0] + now[1] + rim_[i], past[0] + past[1] + rim_halfway_[i], one.force);
-    put_pair(&force_[4 * i], fused(both(side.force), tangent, pair_at(&force_[4 * i])));
+    force_x_[i] += side.force * tangent[0];
+    force_z_[i] += side.force * tangent[1];
     rim_force_[i] += inverse_inertia_ratio_ * side.force;
     rubbed_ += side.lost;
   }
@@ -572,91 +481,113 @@ auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, Wall wa
 }
 
 // To forces of 0.
+template <bool periodic>
+void PressedBed::add_all_pair_forces() {
+  const PairBlock* const blocks = rows_.blocks().data();
+  const PairBlock *const others = blocks + rows_.in_rows(), *const end = blocks + rows_.blocks().size();
+  if (check_due()) touching_ = pair_squares_ = 0;
+  if (rough_) {
+    add_rough_pair_forces<periodic, true>(blocks, others);
+    add_rough_pair_forces<periodic, false>(others, end);
+  } else {
+    add_pair_forces<periodic, true>(blocks, others);
+    add_pair_forces<periodic, false>(others, end);
+  }
+}
+
 void PressedBed::add_forces(const FloorMotion::Motion& floor) {
   rubbed_ = 0;
-  if (rough_) {
-    box_.period > 0 ? add_rough_pair_forces<true>() : add_rough_pair_forces<false>();
-  } else {
-    box_.period > 0 ? add_pair_forces<true>() : add_pair_forces<false>();
-  }
-  loss_rate_ = pair_.damping * pair_squares_;
-  loss_rate_ += add_wall_forces(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_).lost;
-  loss_rate_ += add_wall_forces(near_right_, at_right, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
-  loss_rate_ += add_wall_forces(near_lid_, at_lid, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
+  box_.period > 0 ? add_all_pair_forces<true>() : add_all_pair_forces<false>();
+  wall_loss_rate_ = add_wall_forces(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_).lost;
+  wall_loss_rate_ += add_wall_forces(near_right_, at_right, TwoLanes{-1, 0}, -box_.width, 0, side_).lost;
+  wall_loss_rate_ += add_wall_forces(near_lid_, at_lid, TwoLanes{0, -1}, -box_.lid, 0, lid_).lost;
   const WallContacts on_floor =
       add_wall_forces(near_floor_, at_floor, TwoLanes{0, 1}, floor.position, floor.velocity, floor_);
-  loss_rate_ += on_floor.lost;
+  wall_loss_rate_ += on_floor.lost;
   floor_force_ = on_floor.force;
   floor_at_ = floor;
 }
 
-// What the dashpots of pairs take from the disks at the velocities that they have. Their forces are of the velocities
-// foreseen: in a packed bed, where many disks brake one another, these are larger.
-double PressedBed::lost_in_dashpots() const {
-  const TwoLanes weight = {0, -1}, half = both(0.5 * last_step_);
-  TwoLanes lost{};
+// What the dashpots take. Those of pairs take it from the disks at the velocities that these have; their forces are of
+// the velocities foreseen. In a packed bed, where many disks brake one another, the latter are larger.
+double PressedBed::loss_rate() const {
+  double lost = wall_loss_rate_;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const TwoLanes v = fused(half, pair_at(&force_[4 * i]) + weight, pair_at(&halfway_[2 * i]));
-    lost -= pair_at(&force_[4 * i + 2]) * v;
+    const double vx = halfway_x_[i] + 0.5 * last_step_ * force_x_[i];
+    const double vz = halfway_z_[i] + 0.5 * last_step_ * (force_z_[i] - 1);
+    lost -= dashpot_x_[i] * vx + dashpot_z_[i] * vz;
   }
-  return lost[0] + lost[1];
+  return lost;
+}
+
+// On by a step, to forces of 0. Books what the dashpots took from the middle of the step before to that of this one.
+void PressedBed::move(double dt) {
+  const Lanes half = all_lanes(0.5 * dt), last_half = all_lanes(0.5 * last_step_),
+              halves = all_lanes(0.5 * (last_step_ + dt)), whole = all_lanes(dt), weight = all_lanes(-1);
+  Lanes lost{};
+  const auto turn = [&](double* halfway, double* speed, double* force, Lanes a) {
+    const Lanes v = fused(halves, a, four_at(halfway));
+    put_four(halfway, v);
+    put_four(speed, fused(half, a, v));
+    put_four(force, Lanes{});
+    return v;
+  };
+  const auto along = [&](double* place, double* halfway, double* speed, double* force, double* dashpot, Lanes a) {
+    lost = fused(four_at(dashpot), fused(last_half, a, four_at(halfway)), lost);
+    const Lanes v = turn(halfway, speed, force, a);
+    put_four(place, fused(whole, v, four_at(place)));
+    put_four(dashpot, Lanes{});
+  };
+  const Numbers by = numbers();
+  const std::size_t count = count_;
+  for (std::size_t i = 0; i < count; i += PressedRows::lanes) {
+    along(by.x + i, by.halfway_x + i, by.vx + i, by.force_x + i, by.dashpot_x + i, four_at(by.force_x + i));
+    along(by.z + i, by.halfway_z + i, by.vz + i, by.force_z + i, by.dashpot_z + i, four_at(by.force_z + i) + weight);
+  }
+  for (std::size_t i = 0; rough_ && i < count; i += PressedRows::lanes)
+    turn(by.rim_halfway + i, by.rim + i, by.rim_force + i, four_at(by.rim_force + i));
+  damped_ += 0.5 * (last_step_ + dt) * (wall_loss_rate_ - sum_of(lost));
+  last_step_ = dt;
 }
 
 void PressedBed::step(const FloorMotion::Motion& before, const FloorMotion::Motion& after, double dt) {
   assert(dt > 0);
-  const TwoLanes weight = {0, -1}, half = both(0.5 * dt), halves = both(0.5 * (last_step_ + dt)), whole = both(dt);
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    double* const disk = &disks_[i].x;
-    const TwoLanes a = pair_at(&force_[4 * i]) + weight, v = fused(halves, a, pair_at(&halfway_[2 * i]));
-    put_pair(&halfway_[2 * i], v);
-    put_pair(disk, fused(whole, v, pair_at(disk)));
-    put_pair(disk + 2, fused(half, a, v));
-    put_pair(&force_[4 * i], TwoLanes{});
-    put_pair(&force_[4 * i + 2], TwoLanes{});
-  }
-  if (rough_) {
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      rim_halfway_[i] += 0.5 * (last_step_ + dt) * rim_force_[i];
-      rim_[i] = rim_halfway_[i] + 0.5 * dt * rim_force_[i];
-      rim_force_[i] = 0;
-    }
-  }
-  last_step_ = dt;
+  move(dt);
   if (--until_check_ == 0) check(after, dt);
-  const double force_before = floor_force_, loss_before = loss_rate_;
+  const double force_before = floor_force_;
   slip_time_ = dt;
   add_forces(after);
   slip_time_ = 0;
-  if (!rough_) loss_rate_ += lost_in_dashpots() - pair_.damping * pair_squares_;
   floor_work_ += 0.5 * (force_before + floor_force_) * (after.position - before.position);
-  damped_ += 0.5 * (loss_before + loss_rate_) * dt + rubbed_;
+  damped_ += rubbed_;
 }
 
 void PressedBed::lie(const FloorMotion::Motion& floor) {
-  last_step_ = 0;
+  damped_ = damped();
+  last_step_ = wall_loss_rate_ = 0;
   for (std::uint32_t i = 0; i < count_; ++i) {
-    const TwoLanes velocity = {0, floor.velocity};
-    put_pair(&halfway_[2 * i], velocity);
-    put_pair(&disks_[i].vx, velocity);
-    put_pair(&force_[4 * i], TwoLanes{0, 1 + floor.acceleration});
+    halfway_x_[i] = vx_[i] = force_x_[i] = 0;
+    halfway_z_[i] = vz_[i] = floor.velocity;
+    force_z_[i] = 1 + floor.acceleration;
   }
-  for (auto* values : {&rim_, &rim_halfway_, &rim_force_}) std::fill(values->begin(), values->end(), 0.0);
+  for (auto* values : {&dashpot_x_, &dashpot_z_, &rim_, &rim_halfway_, &rim_force_})
+    std::fill(values->begin(), values->end(), 0.0);
   floor_force_ = count_ * (1 + floor.acceleration);
-  loss_rate_ = 0;
 }
 
 void PressedBed::carry(const FloorMotion::Motion& before, const FloorMotion::Motion& after) {
   const double rise = after.position - before.position;
-  for (std::uint32_t i = 0; i < count_; ++i) disks_[i].z += rise;
+  for (std::uint32_t i = 0; i < count_; ++i) z_[i] += rise;
   floor_work_ += count_ * (rise + 0.5 * (after.velocity * after.velocity - before.velocity * before.velocity));
   floor_at_ = after;
   lie(after);
 }
 
 void PressedBed::wake(const FloorMotion::Motion& floor) {
-  list_pairs(floor.position);
-  std::fill(force_.begin(), force_.end(), 0.0);
-  std::fill(rim_force_.begin(), rim_force_.end(), 0.0);
+  list_neighbours();
+  list_walls(floor.position, 0);
+  until_check_ = steps_a_check;
+  for (auto* forces : {&force_x_, &force_z_, &rim_force_}) std::fill(forces->begin(), forces->end(), 0.0);
   add_forces(floor);
   damped_ += rubbed_;
 }
@@ -668,16 +599,15 @@ double PressedBed::compressed() const {
   const auto add = [&sum](double overlap, const Spring& spring) {
     if (overlap > 0) sum += 0.5 * spring.stiffness * overlap * overlap;
   };
-  for (std::size_t p = 0; p < first_.size(); ++p) {
-    const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
-    if (i >= count_) continue;
+  each_neighbour([&](std::uint32_t i, std::uint32_t k, std::size_t) {
     const TwoLanes d = gap_of(i, k);
-    add(2 * disk_radius - std::sqrt(d[0] * d[0] + d[1] * d[1]), pair_);
-  }
-  for (const std::uint32_t i : near_left_) add(disk_radius - disks_[i].x, side_);
-  for (const std::uint32_t i : near_right_) add(disks_[i].x + disk_radius - box_.width, side_);
-  for (const std::uint32_t i : near_lid_) add(disks_[i].z + disk_radius - box_.lid, lid_);
-  for (const std::uint32_t i : near_floor_) add(floor_at_.position + disk_radius - disks_[i].z, floor_);
+    const double u = 1 - (d[0] * d[0] + d[1] * d[1]);
+    if (u > 0) sum += pair_.stiffness / 8 * u * u;
+  });
+  for (const std::uint32_t i : near_left_) add(disk_radius - x_[i], side_);
+  for (const std::uint32_t i : near_right_) add(x_[i] + disk_radius - box_.width, side_);
+  for (const std::uint32_t i : near_lid_) add(z_[i] + disk_radius - box_.lid, lid_);
+  for (const std::uint32_t i : near_floor_) add(floor_at_.position + disk_radius - z_[i], floor_);
   if (rough_) sum += stretched();
   return sum;
 }
@@ -689,21 +619,21 @@ void PressedBed::separate(double floor, double most, int sweeps) {
       worst = std::max(worst, overlap);
       return std::max(overlap, 0.0);
     };
-    for (const std::uint32_t i : near_floor_) disks_[i].z += excess(floor + disk_radius - disks_[i].z);
-    for (const std::uint32_t i : near_lid_) disks_[i].z -= excess(disks_[i].z + disk_radius - box_.lid);
-    for (const std::uint32_t i : near_left_) disks_[i].x += excess(disk_radius - disks_[i].x);
-    for (const std::uint32_t i : near_right_) disks_[i].x -= excess(disks_[i].x + disk_radius - box_.width);
-    for (std::size_t p = 0; p < first_.size(); ++p) {
-      const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
-      if (i >= count_) continue;
+    for (const std::uint32_t i : near_floor_) z_[i] += excess(floor + disk_radius - z_[i]);
+    for (const std::uint32_t i : near_lid_) z_[i] -= excess(z_[i] + disk_radius - box_.lid);
+    for (const std::uint32_t i : near_left_) x_[i] += excess(disk_radius - x_[i]);
+    for (const std::uint32_t i : near_right_) x_[i] -= excess(x_[i] + disk_radius - box_.width);
+    each_neighbour([&](std::uint32_t i, std::uint32_t k, std::size_t) {
       const TwoLanes d = gap_of(i, k);
       const double squared = d[0] * d[0] + d[1] * d[1];
-      if (squared >= 4 * disk_radius * disk_radius) continue;
+      if (squared >= 4 * disk_radius * disk_radius) return;
       const double distance = std::sqrt(squared);
       const TwoLanes move = both(0.5 * overdone * excess(2 * disk_radius - distance) / distance) * d;
-      put_pair(&disks_[i].x, pair_at(&disks_[i].x) - move);
-      put_pair(&disks_[k].x, pair_at(&disks_[k].x) + move);
-    }
+      x_[i] -= move[0];
+      z_[i] -= move[1];
+      x_[k] += move[0];
+      z_[k] += move[1];
+    });
     if (worst <= most) return;
   }
 }

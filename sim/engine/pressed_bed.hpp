@@ -1,6 +1,9 @@
-// A bed under load as soft disks: a linear spring and a dashpot in every contact, small steps of time. What hard disks
-// do by ever more and ever smaller contacts, a bed that lies on the floor does here in contacts that last. Equal disks,
+// A bed under load as soft disks: a spring and a dashpot in every contact, small steps of time. What hard disks do by
+// ever more and ever smaller contacts, a bed that lies on the floor does here in contacts that last. Equal disks,
 // smooth or rough; the engine decides when (engine_press.hpp).
+//
+// The spring's force is linear in (1 - r^2)/2, r being the distance of the centres: in the overlap, but for its square.
+// So no root is taken. Disks stand along their rows, and four pairs are computed at a time (pressed_rows.hpp).
 //
 // Rough disks have a tangential spring and dashpot in every contact, too, which give way to Coulomb friction
 // [CundallStrack1979]. The spring is stretched by the slip while the contact lasts.
@@ -18,6 +21,7 @@
 #include "sim/engine/disk.hpp"
 #include "sim/engine/floor_motion.hpp"
 #include "sim/engine/lanes.hpp"
+#include "sim/engine/pressed_rows.hpp"
 #include "sim/scene/surface.hpp"
 
 namespace shakebed::sim {
@@ -74,35 +78,35 @@ class PressedBed {
   // After the last step, and `later` than that.
   State at(std::uint32_t i, double later) const;
   double spin_at(std::uint32_t i, double later) const {
-    return (rim_halfway_[i] + (0.5 * last_step_ + later) * rim_force_[i]) / 0.5;
+    const std::uint32_t place = place_of_[i];
+    return (rim_halfway_[place] + (0.5 * last_step_ + later) * rim_force_[place]) / 0.5;
   }
   std::vector<Stretch> stretches() const;
   void let_go();  // of all tangential springs; their energy counts as damped
   double floor_force() const { return floor_force_; }
-  double floor_work() const { return floor_work_; }  // since begin()
-  double damped() const { return damped_; }          // in dashpots, since begin()
-  double loss_rate() const { return loss_rate_; }    // of the dashpots now
-  double compressed() const;                         // energy of the springs
-  double approach() const;                           // of disks in contact, root of the mean square
+  double floor_work() const { return floor_work_; }                           // since begin()
+  double damped() const { return damped_ + 0.5 * last_step_ * loss_rate(); }  // in dashpots, since begin()
+  double loss_rate() const;                                                   // of the dashpots now
+  double compressed() const;                                                  // energy of the springs
+  double approach() const;  // of disks in contact, root of the mean square
   std::uint32_t touching() const { return static_cast<std::uint32_t>(touching_); }  // pairs
   // Calls visit(centre of the first, from there to the second, force on the second) for each pair in contact.
   template <class Visit>
   void each_contact(Visit visit) const {
-    for (std::size_t p = 0; p < first_.size(); ++p) {
-      const std::uint32_t i = disk_at(first_[p]), k = disk_at(second_[p]);
+    each_neighbour([&](std::uint32_t i, std::uint32_t k, std::size_t lane) {
       const TwoLanes d = gap_of(i, k);
-      const double distance = std::sqrt(d[0] * d[0] + d[1] * d[1]);
-      if (i >= count_ || !(distance < 1)) continue;
-      const TwoLanes normal = d / both(distance), flow = (velocity_of(k) - velocity_of(i)) * normal;
-      const double force = pair_.stiffness * (1 - distance) - pair_.damping * (flow[0] + flow[1]);
-      TwoLanes on_second = both(force) * normal;
+      const double u = 1 - (d[0] * d[0] + d[1] * d[1]);
+      if (!(u > 0)) return;
+      const TwoLanes flow = (velocity_of(k) - velocity_of(i)) * d;
+      const double force = 0.5 * pair_.stiffness * u - pair_.damping * (flow[0] + flow[1]);
+      TwoLanes on_second = both(force) * d;
       if (rough_) {
-        const TwoLanes tangent = {-normal[1], normal[0]};
+        const TwoLanes tangent = {-d[1], d[0]};
         const TwoLanes slip = (velocity_of(i) - velocity_of(k)) * tangent;
-        on_second -= both(pair_.grip.force(stretch_[p], slip[0] + slip[1] + rim_[i] + rim_[k], force)) * tangent;
+        on_second -= both(pair_.grip.force(stretch_[lane], slip[0] + slip[1] + rim_[i] + rim_[k], force)) * tangent;
       }
-      visit(pair_at(&disks_[i].x), d, on_second);
-    }
+      visit(TwoLanes{x_[i], z_[i]}, d, on_second);
+    });
   }
   // Calls visit(disk, whether it is on the floor, force on it) for each disk in contact with a wall.
   template <class Visit>
@@ -110,15 +114,15 @@ class PressedBed {
     const auto all = [&](const std::vector<std::uint32_t>& near, Wall wall, TwoLanes inward, double place, double speed,
                          const Spring& spring) {
       for (const std::uint32_t i : near) {
-        const double force = wall_force(i, inward, place, speed, spring, velocity_of(i)).force;
+        const double force = wall_force(i, inward, place, speed, spring).force;
         if (force == 0) continue;
         TwoLanes on_disk = both(force) * inward;
         if (rough_) {
           const TwoLanes tangent = {inward[1], -inward[0]}, slip = velocity_of(i) * tangent;
-          const double stretch = wall_stretch_[walls * i + wall];
+          const double stretch = wall_stretch_[walls * disk_of_[i] + wall];
           on_disk += both(spring.grip.force(stretch, slip[0] + slip[1] + rim_[i], force)) * tangent;
         }
-        visit(i, &spring == &floor_, on_disk);
+        visit(disk_of_[i], wall == at_floor, on_disk);
       }
     };
     all(near_left_, at_left, TwoLanes{1, 0}, 0, 0, side_);
@@ -148,65 +152,72 @@ class PressedBed {
   struct Pulled {
     double force, lost;
   };
+  struct LaneGrip;
+  // Where the numbers below stand, for loops: the compiler knows that no store changes these pointers.
+  struct Numbers {
+    double *x, *z, *vx, *vz, *halfway_x, *halfway_z, *force_x, *force_z, *dashpot_x, *dashpot_z, *rim, *rim_halfway,
+        *rim_force;
+  };
+  Numbers numbers();
   Spring spring_of(const Surface& surface) const;
   Grip grip_of(const Surface& surface) const;
   Pulled pull(double& stretch, const Grip& grip, double slip, double slipped, double normal_force) const;
-  struct PulledLanes {
-    Lanes force, stretch, lost;
-  };
-  PulledLanes pull(Lanes stretch, Lanes slip, Lanes slipped, Lanes normal_force) const;
   double stretched() const;
-  void list_pairs(double floor);
-  void list_walls(double floor);
-  void interleave();
-  template <bool rough>
-  void choose_active(double dt);
-  void keep_stretches();
-  void place_stretches(std::vector<Stretch>& stretches);
-  template <bool periodic>
-  void add_rough_pair_forces();
+  std::vector<Stretch> pair_stretches() const;
+  void place_stretches(std::vector<Stretch> stretches);
+  void list_neighbours();
+  void list_walls(double floor, double margin);
   void check(const FloorMotion::Motion& floor, double dt);
+  void move(double dt);
   void add_forces(const FloorMotion::Motion& floor);
-  double lost_in_dashpots() const;
   template <bool periodic>
-  void add_pair_forces();
-  static std::uint32_t disk_at(std::uint32_t place) { return place / static_cast<std::uint32_t>(sizeof(State)); }
-  TwoLanes velocity_of(std::uint32_t i) const { return pair_at(&disks_[i].vx); }
-  WallContacts wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring,
-                          TwoLanes velocity) const;
+  void add_all_pair_forces();
+  template <bool periodic, bool in_row>
+  void add_pair_forces(const PairBlock* pair, const PairBlock* end);
+  template <bool periodic, bool in_row>
+  void add_rough_pair_forces(const PairBlock* pair, const PairBlock* end);
+  WallContacts wall_force(std::uint32_t i, TwoLanes inward, double place, double speed, const Spring& spring) const;
   WallContacts add_wall_forces(const std::vector<std::uint32_t>& near, Wall wall, TwoLanes inward, double place,
                                double speed, const Spring& spring);
+  TwoLanes velocity_of(std::uint32_t i) const { return TwoLanes{vx_[i], vz_[i]}; }
   TwoLanes gap_of(std::uint32_t i, std::uint32_t k) const;
+  // Calls visit(place, place of the other, lane) for each two that may touch.
+  template <class Visit>
+  void each_neighbour(Visit visit) const {
+    const std::vector<PairBlock>& blocks = rows_.blocks();
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      for (std::uint32_t q = 0; q < PressedRows::lanes; ++q) {
+        const std::uint32_t i = blocks[b].first + q, k = blocks[b].second + q;
+        if (k < count_) visit(i, k, PressedRows::lanes * b + q);
+      }
+    }
+  }
 
   Box box_;
   std::array<Spring, 4> of_unit_time_;  // of a contact time of 1
   Spring pair_, side_, floor_, lid_;
   std::uint32_t count_ = 0;
-  std::vector<State> disks_;     // velocities: those foreseen for the end of the step. Two sentinels behind the last
-  std::vector<double> halfway_;  // velocities half a step before, {vx, vz}
-  // {x, z} at the places of disks_, weight apart, and what of it is that of the dashpots of smooth pairs.
-  std::vector<double> force_;
+  PressedRows rows_;
+  std::vector<std::uint32_t> disk_of_, place_of_;  // of a place, and of a disk
+  // By place; behind the last stand some that touch nothing. Velocities: those foreseen for the end of the step, and
+  // those half a step before. Forces but for the weight, and what of them is that of the dashpots of pairs.
+  std::vector<double> x_, z_, vx_, vz_, halfway_x_, halfway_z_, force_x_, force_z_, dashpot_x_, dashpot_z_;
+  std::vector<double> listed_x_, listed_z_;  // when the neighbours were listed
+  std::vector<double> permuted_;             // while they are
   double last_step_ = 0;
   // --- of rough disks
   bool rough_ = false;
   double inverse_inertia_ratio_ = 0;
-  // R times the spin, foreseen and half a step before, and how it is accelerated.
+  // R times the spin, foreseen and half a step before, and how it is accelerated. By place.
   std::vector<double> rim_, rim_halfway_, rim_force_;
-  // Of pairs, as they are listed, and of no pair; {left, right, floor, lid} of each disk.
+  // Of the lanes of the blocks; {left, right, floor, lid} of each disk.
   std::vector<double> stretch_, wall_stretch_;
-  std::vector<Stretch> kept_;          // while neighbours are listed anew
-  std::vector<std::uint32_t> active_;  // pairs, as they are listed; those of active_first_
-  double slip_time_ = 0;               // the step whose forces are added
-  double rubbed_ = 0;                  // lost by tangential forces in this step
-  std::vector<double> listed_;         // {x, z} when the neighbours were listed, z above the floor
-  // Pairs as places in disks_ in bytes: all neighbours, and those that may touch before the next check.
-  std::vector<std::uint32_t> first_, second_, active_first_, active_second_;
-  std::size_t in_contact_ = 0;        // of the active ones the first, when they were chosen
-  std::vector<std::uint32_t> apart_;  // while they are chosen
-  std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;
+  double slip_time_ = 0;                                                       // the step whose forces are added
+  double rubbed_ = 0;                                                          // lost by tangential forces in this step
+  std::vector<std::uint32_t> near_left_, near_right_, near_floor_, near_lid_;  // places
   std::uint32_t until_check_ = steps_a_check;
-  double usual_approach_ = 0;  // of neighbours
-  double touching_ = 0, loss_rate_ = 0, pair_squares_ = 0, floor_force_ = 0, floor_work_ = 0, damped_ = 0;
+  double touching_ = 0, pair_squares_ = 0;  // at the last check
+  double wall_loss_rate_ = 0, floor_force_ = 0, floor_work_ = 0, damped_ = 0;
   double fastest_ = never, mean_square_speed_ = never, side_temperature_ = never;
   FloorMotion::Motion floor_at_{};  // that of the latest forces
 };
