@@ -386,7 +386,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
-  rims = most_telling(frame, std::move(rims), options);
+  if (!options.quick_rims) rims = most_telling(frame, std::move(rims), options);
   return calibration_by_rims(frame, rims, options);
 }
 

@@ -252,8 +252,8 @@ bool enough(double expected, const std::vector<FoundDisk>& found) {
 }
 
 // With this radius, to begin with.
-void look_with(double radius_px, const std::vector<FoundDisk>& found, SeenShade& seen) {
-  const LearnedRims rims = learn_rims(seen.painted, seen.beads.polarity, radius_px, Known::radius);
+void look_with(double radius_px, const std::vector<FoundDisk>& found, PictureMaps& maps, SeenShade& seen) {
+  const LearnedRims rims = learn_rims(maps, seen.beads.polarity, radius_px, Known::radius);
   const FreeOf free(found);
   double expected = 0;
   for (const RimDisk& disk : rims.disks)
@@ -267,7 +267,7 @@ void look_with(double radius_px, const std::vector<FoundDisk>& found, SeenShade&
 // quick.
 bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, const std::vector<FoundDisk>& found) {
   const ScaledPicture at = scaled_for(painted, radius_px);
-  EdgeMap edges = find_edges(at.picture);
+  EdgeMap edges = edges_of(at);
   const float plain = plain_edge * edges.threshold;
   const FreeOf free(found);
   std::erase_if(edges.ridge, [&](const RidgePixel& pixel) {
@@ -294,15 +294,16 @@ std::optional<SeenShade> seen_of(const GrayFrame& frame, const FinderCalibration
   std::optional<GrayFrame> painted = painted_over(frame, found, margin_of(calibration), polarity);
   if (!painted || !leaves_rims(*painted, calibration.radius_px, polarity, found)) return std::nullopt;
   SeenShade seen{std::move(*painted), {polarity, calibration.radius_px}};
-  look_with(calibration.radius_px, found, seen);
+  PictureMaps maps(seen.painted, quick_search.wanted_px);
+  look_with(calibration.radius_px, found, maps, seen);
   if (enough(seen.expected, found)) return seen;
   CensusOptions asked;
   asked.polarity = polarity;
   std::size_t tried = 0;
   for (const CircleHypothesis& hypothesis : take_census({&seen.painted}, asked).hypotheses) {
     const double ratio = hypothesis.radius_px / calibration.radius_px;
-    if (ratio < smallest_other || ratio > largest_other) continue;
-    look_with(hypothesis.radius_px, found, seen);
+    if (ratio < smallest_other || ratio > largest_other || hypothesis.hopeless()) continue;
+    look_with(hypothesis.radius_px, found, maps, seen);
     if (++tried == most_other_sizes || enough(seen.expected, found)) break;
   }
   return seen;
@@ -416,7 +417,8 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   find.radius_px.reset();
   find.hold_radius = false;
   // Where faces did not show the one shade, they took most of the time and did not show the other. So did the thorough
-  // search by rims.
+  // search by rims, of text beside a bed two thirds.
+  find.quick_rims = true;
   find.quick_rims_only = calibration.by_rims;
   CalibrationResult learned = learn_beads({&best->painted}, find);
   if (!learned.found || !learned.calibration.rims) return;
