@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/candidates.hpp"
 #include "ingest/find/circle_census.hpp"
@@ -290,8 +291,11 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
 
 // Of the same size as the beads found, else of the size of which most circles are seen.
 std::optional<SeenShade> seen_of(const GrayFrame& frame, const FinderCalibration& calibration,
-                                 const std::vector<FoundDisk>& found, Polarity polarity) {
+                                 const std::optional<PixelRectangle>& roi, const std::vector<FoundDisk>& found,
+                                 Polarity polarity) {
   std::optional<GrayFrame> painted = painted_over(frame, found, margin_of(calibration), polarity);
+  // What lies elsewhere, as text does, would be searched in vain, and so would its chance circles.
+  if (painted && roi) painted = seen_inside(std::move(*painted), *roi);
   if (!painted || !leaves_rims(*painted, calibration.radius_px, polarity, found)) return std::nullopt;
   SeenShade seen{std::move(*painted), {polarity, calibration.radius_px}};
   PictureMaps maps(seen.painted, quick_search.wanted_px);
@@ -407,7 +411,7 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   std::optional<SeenShade> best;
   for (const Polarity polarity : {Polarity::bright_beads, Polarity::dark_beads}) {
     if (options.polarity != Polarity::automatic && options.polarity != polarity) continue;
-    std::optional<SeenShade> seen = seen_of(frame, calibration, found.disks, polarity);
+    std::optional<SeenShade> seen = seen_of(frame, calibration, options.roi, found.disks, polarity);
     if (seen && (!best || seen->expected > best->expected)) best = std::move(seen);
   }
   if (!best || !enough(best->expected, found.disks)) return;
@@ -446,8 +450,9 @@ void add_other_shade(const GrayFrame& frame, const FinderCalibration& calibratio
                      FindResult& found) {
   if (!calibration.other_shade) return;
   const FinderCalibration& other = *calibration.other_shade;
-  const auto painted = painted_over(frame, found.disks, margin_of(calibration), other.polarity);
+  auto painted = painted_over(frame, found.disks, margin_of(calibration), other.polarity);
   if (!painted) return;
+  if (options.roi) painted = seen_inside(std::move(*painted), *options.roi);
   FindOptions find = options;
   find.learn_rim = false;
   FindResult more = others_in(*painted, other, find, found.disks);
