@@ -132,6 +132,19 @@ GrayFrame cut_out(const GrayFrame& frame, const PicturePart& part) {
   return cut;
 }
 
+GrayFrame seen_inside(GrayFrame frame, const PixelRectangle& rectangle, double margin_px) {
+  const int margin = static_cast<int>(std::ceil(margin_px));
+  const int left = std::clamp(rectangle.left - margin, 0, frame.width);
+  const int right = std::clamp(rectangle.left + rectangle.width + margin, left, frame.width);
+  for (int row = 0; row < frame.height; ++row) {
+    const auto line = frame.pixels.begin() + static_cast<std::ptrdiff_t>(row) * frame.width;
+    const bool inside = row >= rectangle.top - margin && row < rectangle.top + rectangle.height + margin;
+    std::fill(line, line + (inside ? left : frame.width), unseen_level);
+    if (inside) std::fill(line + right, line + frame.width, unseen_level);
+  }
+  return frame;
+}
+
 PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling& sampling) {
   PicturePart part;
   part.width = std::min(side, frame.width);

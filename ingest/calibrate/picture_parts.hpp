@@ -17,6 +17,9 @@ struct PicturePart {
 };
 GrayFrame cut_out(const GrayFrame& frame, const PicturePart& part);
 
+// The frame of which all that is farther than `margin_px` from the rectangle is unseen.
+GrayFrame seen_inside(GrayFrame frame, const PixelRectangle& rectangle, double margin_px = 0);
+
 // How changes of level are looked for: in blocks of pixels, between pixels `reach` apart, at every `stride`-th column
 // of every second row.
 struct ChangeSampling {

@@ -143,7 +143,7 @@ class Census {
   void search(std::size_t channel, const GrayFrame& frame) {
     const double range = range_of(frame);
     for (const ScaledPicture& level : pyramid_of(frame, options_)) {
-      const EdgeMap edges = find_edges(level.picture);
+      const EdgeMap edges = edges_of(level);
       const EdgeMap one = edges_of_stretched(level.picture, decoy_stretch, 0, edges.threshold);
       const EdgeMap other = edges_of_stretched(level.picture, decoy_stretch, std::numbers::pi / 4, edges.threshold);
       const RadiusRange range_of_radii = radii_at(level.scale, options_);

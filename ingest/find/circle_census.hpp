@@ -30,6 +30,9 @@ struct CircleHypothesis {
   double scatter = 0;          // of the edges about the rims, radii
   double contrast = 0;         // median step across the rim, grey levels
   std::vector<Circle> seen;    // px of the full frame
+  // Chance makes up too many of its circles: not worth a full search.
+  [[nodiscard]] bool hopeless() const { return by_chance > hopeless_share * circles; }
+  static constexpr double hopeless_share = 0.5;
 };
 
 struct CensusOptions {

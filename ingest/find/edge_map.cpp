@@ -18,23 +18,30 @@ constexpr float noise_multiple = 4.0F;
 // Standard deviation of a gradient component under white noise of one grey level, binomial filter and central
 // difference: sqrt(0.0820 * 0.2734), the sums of squares of the filters across and along.
 constexpr float gradient_noise = 0.150F;
+// The same in a picture of twice the resolution, under noise of one grey level in the picture it was interpolated from.
+constexpr float gradient_noise_of_doubled = 0.191F;
 // Edges below this share of the strong ones (their 95th percentile) belong to something else.
 constexpr float weakest_share = 0.1F;
 // Grey levels per px: below the rounding of 8-bit pictures.
 constexpr float least_threshold = 0.3F;
 constexpr int smallest_map = 5;  // px, side
 
-// Standard deviation of white noise, from second differences along rows.
-float white_noise_of(const GrayFrame& frame) {
+// Standard deviation of white noise, from second differences along rows: of the picture, or of the one that it was
+// interpolated from.
+float white_noise_of(const GrayFrame& frame, Pixels pixels) {
+  // From one pixel to the next that is interpolated alike. Variance of such a difference: 1 + 4 + 1, or, of weights 3/4
+  // and 1/4 along both axes, (9 + 25 + 1 + 1) / 16 * 10 / 16.
+  const std::size_t apart = pixels == Pixels::own ? 1 : 2;
+  const float variance = pixels == Pixels::own ? 6.0F : 1.40625F;
   std::vector<float> sizes;
   const std::size_t step = std::max<std::size_t>(1, frame.pixels.size() / 60000);
   const std::size_t width = static_cast<std::size_t>(frame.width);
-  for (std::size_t at = 1; at + 1 < frame.pixels.size(); at += step) {
-    if (at % width == 0 || at % width == width - 1) continue;
-    const float left = frame.pixels[at - 1], middle = frame.pixels[at], right = frame.pixels[at + 1];
+  for (std::size_t at = apart; at + apart < frame.pixels.size(); at += step) {
+    if (at % width < apart || at % width >= width - apart) continue;
+    const float left = frame.pixels[at - apart], middle = frame.pixels[at], right = frame.pixels[at + apart];
     if (!unseen(left + middle + right)) sizes.push_back(std::abs(left - 2 * middle + right));
   }
-  return 1.4826F * quantile_of(sizes, 0.5) / std::sqrt(6.0F);
+  return 1.4826F * quantile_of(sizes, 0.5) / std::sqrt(variance);
 }
 
 // Smooths by 1/4, 1/2, 1/4 along both axes, line by line; the outermost pixels stay. Hands each line on with its row.
@@ -120,12 +127,13 @@ EdgeMap gradients_of(int width, int height, const std::function<const float*(int
   return edges;
 }
 
-float threshold_of(const GrayFrame& frame, const EdgeMap& edges) {
+float threshold_of(const GrayFrame& frame, const EdgeMap& edges, Pixels pixels) {
   std::vector<float> sizes;
   const std::size_t step = std::max<std::size_t>(1, edges.x.size() / 60000);
   for (std::size_t at = 0; at < edges.x.size(); at += step) sizes.push_back(edges.slope(at));
   const float strong = quantile_of(sizes, 0.95);
-  return std::max({noise_multiple * gradient_noise * white_noise_of(frame), weakest_share * strong, least_threshold});
+  const float noise = pixels == Pixels::own ? gradient_noise : gradient_noise_of_doubled;
+  return std::max({noise_multiple * noise * white_noise_of(frame, pixels), weakest_share * strong, least_threshold});
 }
 
 // First pixel of a line, from `column` on, that is marked; its end where there is none.
@@ -162,12 +170,12 @@ void thin(EdgeMap& edges) {
 
 }  // namespace
 
-EdgeMap find_edges(const GrayFrame& frame, float threshold) {
+EdgeMap find_edges(const GrayFrame& frame, float threshold, Pixels pixels) {
   EdgeMap edges = gradients_of(frame.width, frame.height, [&](int row) {
     return frame.pixels.data() + static_cast<std::ptrdiff_t>(row) * frame.width;
   });
   if (std::min(frame.width, frame.height) < smallest_map) return edges;
-  edges.threshold = threshold > 0 ? threshold : threshold_of(frame, edges);
+  edges.threshold = threshold > 0 ? threshold : threshold_of(frame, edges, pixels);
   thin(edges);
   return edges;
 }

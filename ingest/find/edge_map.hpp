@@ -32,7 +32,9 @@ inline constexpr double step_per_slope = 2.5;
 
 // The picture is smoothed by a binomial filter of five pixels (a standard deviation of one pixel). Next to unseen
 // pixels there is no edge. `threshold` 0: found from the picture's noise and its strongest edges.
-EdgeMap find_edges(const GrayFrame& frame, float threshold = 0);
+// A picture made by doubled() has the noise of the one it was made of, spread over two pixels.
+enum class Pixels { own, doubled };
+EdgeMap find_edges(const GrayFrame& frame, float threshold = 0, Pixels pixels = Pixels::own);
 
 // The same of a picture that is made line by line and never held: row(0), row(1), .. are asked for in this order. Each
 // is read before the next is asked for. `threshold` is above 0.

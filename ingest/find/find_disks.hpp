@@ -52,6 +52,7 @@ struct FindOptions {
   std::optional<BeadsSeen> seen{};      // for learn_beads()
   bool one_size = false;                // learn_beads() looks for no beads of other sizes
   bool rims_of_one_size = false;        // learn_beads() searches rims at a higher resolution for one size only
+  bool quick_rims = false;              // learn_beads() searches rims quickly, whatever it misses
   bool quick_rims_only = false;         // learn_beads() looks at no faces, and searches rims quickly
   bool any_shape = false;               // things that are not round may be beads
   std::optional<PixelRectangle> roi{};  // centres outside are not reported

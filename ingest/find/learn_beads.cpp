@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/other_shade.hpp"
@@ -34,6 +35,8 @@ constexpr double least_ratio = 0.97, most_ratio = 1.15;
 constexpr double plainly_seen = 0.8;  // mean share of the rims
 constexpr double well_explained =
     0.35;  // of the edges: where most beads were found by rims 0.35 to 0.85, else 0.10 to 0.34
+// Radii: beads are looked for no farther from the region given.
+constexpr double beyond_region = 4;
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
 Circle place_of(const FoundDisk& disk) {
@@ -344,10 +347,13 @@ double expected_beads(const std::vector<RimDisk>& disks) {
   return expected;
 }
 
-LearnedRims learn_quickly(const GrayFrame& frame, const BeadsSeen& seen, bool one_size) {
-  PictureMaps maps(frame, quick_search.wanted_px);
+LearnedRims learn_quickly(const GrayFrame& frame, const FindOptions& options) {
+  const BeadsSeen& seen = *options.seen;
+  std::optional<GrayFrame> inside;
+  if (options.roi) inside = seen_inside(frame, *options.roi, beyond_region * seen.radius_px);
+  PictureMaps maps(inside ? *inside : frame, quick_search.wanted_px);
   LearnedRims rims = learn_rims(maps, seen.polarity, seen.radius_px, Known::beads);
-  learn_gaps(maps, rims, one_size);
+  learn_gaps(maps, rims, options.one_size);
   return rims;
 }
 
@@ -378,7 +384,7 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   if (!options.seen) return learn_finder(frames, options);
   const GrayFrame& frame = *frames.back();
-  LearnedRims rims = learn_quickly(frame, *options.seen, options.one_size);
+  LearnedRims rims = learn_quickly(frame, options);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
@@ -386,12 +392,15 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   const bool of_one_size = rims.model.gaps->other_sizes.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
-  rims = most_telling(frame, std::move(rims), options);
+  if (!options.quick_rims) rims = most_telling(frame, std::move(rims), options);
   return calibration_by_rims(frame, rims, options);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
-  return calibration_by_rims(frame, learn_quickly(frame, seen, true), {});
+  FindOptions options;
+  options.seen = seen;
+  options.one_size = true;
+  return calibration_by_rims(frame, learn_quickly(frame, options), {});
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

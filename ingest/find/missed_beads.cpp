@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "ingest/find/edge_map.hpp"
-#include "ingest/find/picture_scale.hpp"
+#include "ingest/find/picture_maps.hpp"
 
 namespace shakebed::ingest {
 
@@ -229,7 +229,7 @@ double expected_missed_beads(const GrayFrame& frame, const RimModel& model, cons
   const ScaledPicture at = scaled_for(frame, model.radius_px);
   // A threshold that was learned at another scale says nothing here.
   const bool of_this_scale = model.search.wanted_px == quick_radius_px;
-  const EdgeMap edges = find_edges(at.picture, of_this_scale ? model.threshold : 0);
+  const EdgeMap edges = edges_of(at, of_this_scale ? model.threshold : 0);
   std::vector<Circle> disks = found;
   for (Circle& disk : disks) {
     disk.x = at.from_frame_x(disk.x);

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/candidates.hpp"
 #include "ingest/find/circle_census.hpp"
@@ -252,8 +253,8 @@ bool enough(double expected, const std::vector<FoundDisk>& found) {
 }
 
 // With this radius, to begin with.
-void look_with(double radius_px, const std::vector<FoundDisk>& found, SeenShade& seen) {
-  const LearnedRims rims = learn_rims(seen.painted, seen.beads.polarity, radius_px, Known::radius);
+void look_with(double radius_px, const std::vector<FoundDisk>& found, PictureMaps& maps, SeenShade& seen) {
+  const LearnedRims rims = learn_rims(maps, seen.beads.polarity, radius_px, Known::radius);
   const FreeOf free(found);
   double expected = 0;
   for (const RimDisk& disk : rims.disks)
@@ -267,7 +268,7 @@ void look_with(double radius_px, const std::vector<FoundDisk>& found, SeenShade&
 // quick.
 bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, const std::vector<FoundDisk>& found) {
   const ScaledPicture at = scaled_for(painted, radius_px);
-  EdgeMap edges = find_edges(at.picture);
+  EdgeMap edges = edges_of(at);
   const float plain = plain_edge * edges.threshold;
   const FreeOf free(found);
   std::erase_if(edges.ridge, [&](const RidgePixel& pixel) {
@@ -290,19 +291,23 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
 
 // Of the same size as the beads found, else of the size of which most circles are seen.
 std::optional<SeenShade> seen_of(const GrayFrame& frame, const FinderCalibration& calibration,
-                                 const std::vector<FoundDisk>& found, Polarity polarity) {
+                                 const std::optional<PixelRectangle>& roi, const std::vector<FoundDisk>& found,
+                                 Polarity polarity) {
   std::optional<GrayFrame> painted = painted_over(frame, found, margin_of(calibration), polarity);
+  // What lies elsewhere, as text does, would be searched in vain, and so would its chance circles.
+  if (painted && roi) painted = seen_inside(std::move(*painted), *roi);
   if (!painted || !leaves_rims(*painted, calibration.radius_px, polarity, found)) return std::nullopt;
   SeenShade seen{std::move(*painted), {polarity, calibration.radius_px}};
-  look_with(calibration.radius_px, found, seen);
+  PictureMaps maps(seen.painted, quick_search.wanted_px);
+  look_with(calibration.radius_px, found, maps, seen);
   if (enough(seen.expected, found)) return seen;
   CensusOptions asked;
   asked.polarity = polarity;
   std::size_t tried = 0;
   for (const CircleHypothesis& hypothesis : take_census({&seen.painted}, asked).hypotheses) {
     const double ratio = hypothesis.radius_px / calibration.radius_px;
-    if (ratio < smallest_other || ratio > largest_other) continue;
-    look_with(hypothesis.radius_px, found, seen);
+    if (ratio < smallest_other || ratio > largest_other || hypothesis.hopeless()) continue;
+    look_with(hypothesis.radius_px, found, maps, seen);
     if (++tried == most_other_sizes || enough(seen.expected, found)) break;
   }
   return seen;
@@ -406,7 +411,7 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   std::optional<SeenShade> best;
   for (const Polarity polarity : {Polarity::bright_beads, Polarity::dark_beads}) {
     if (options.polarity != Polarity::automatic && options.polarity != polarity) continue;
-    std::optional<SeenShade> seen = seen_of(frame, calibration, found.disks, polarity);
+    std::optional<SeenShade> seen = seen_of(frame, calibration, options.roi, found.disks, polarity);
     if (seen && (!best || seen->expected > best->expected)) best = std::move(seen);
   }
   if (!best || !enough(best->expected, found.disks)) return;
@@ -416,7 +421,8 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   find.radius_px.reset();
   find.hold_radius = false;
   // Where faces did not show the one shade, they took most of the time and did not show the other. So did the thorough
-  // search by rims.
+  // search by rims, of text beside a bed two thirds.
+  find.quick_rims = true;
   find.quick_rims_only = calibration.by_rims;
   CalibrationResult learned = learn_beads({&best->painted}, find);
   if (!learned.found || !learned.calibration.rims) return;
@@ -444,8 +450,9 @@ void add_other_shade(const GrayFrame& frame, const FinderCalibration& calibratio
                      FindResult& found) {
   if (!calibration.other_shade) return;
   const FinderCalibration& other = *calibration.other_shade;
-  const auto painted = painted_over(frame, found.disks, margin_of(calibration), other.polarity);
+  auto painted = painted_over(frame, found.disks, margin_of(calibration), other.polarity);
   if (!painted) return;
+  if (options.roi) painted = seen_inside(std::move(*painted), *options.roi);
   FindOptions find = options;
   find.learn_rim = false;
   FindResult more = others_in(*painted, other, find, found.disks);

@@ -24,11 +24,10 @@ constexpr std::size_t fewest_disks = 20;
 // touching up to 0.05, or unexplained from 0.009.
 constexpr double least_touching = 0.5, most_overlapping = 0.02, most_unexplained = 0.003, most_misfit = 1.2;
 constexpr double least_filled = 0.2;
-// px: smaller disks are specks; rims of larger ones are seen well.
-constexpr double smallest_px = 3, largest_px = 14;
+constexpr double smallest_px = 3;  // smaller disks are specks
 constexpr int part_px = 400;
-// Of largest_px: a first radius is good to some 5 %. A model of larger disks would be learned in vain: of a ball of 100
-// px it took nine tenths of the time until the picture was refused.
+// Of largest_packed_px: a first radius is good to some 5 %. A model of larger disks would be learned in vain: of a ball
+// of 100 px it took nine tenths of the time until the picture was refused.
 constexpr double largest_start = 1.25;
 
 struct Neighbours {
@@ -61,7 +60,7 @@ Neighbours neighbours_of(const std::vector<FoundDisk>& disks, double diameter) {
 
 bool is_small(const PackedBed& bed) {
   const double radius = bed.faces.calibration.radius_px;
-  return bed.faces.found && radius >= smallest_px && radius <= largest_px;
+  return bed.faces.found && radius >= smallest_px && radius <= largest_packed_px;
 }
 
 }  // namespace
@@ -162,11 +161,11 @@ std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::
   if (std::max(frame.width, frame.height) > part_px)
     part = cut_out(frame, busiest_part(frame, part_px, {.block = 16, .reach = 2, .stride = 2}));
   for (const PackedStart& start : starts) {
-    if (start.radius_px && (*start.radius_px < smallest_px || *start.radius_px > largest_px)) continue;
+    if (start.radius_px && (*start.radius_px < smallest_px || *start.radius_px > largest_packed_px)) continue;
     FindOptions find;
     find.polarity = start.polarity;
     find.radius_px = start.radius_px;
-    find.largest_radius_px = largest_start * largest_px;
+    find.largest_radius_px = largest_start * largest_packed_px;
     PackedBed bed = learn_packed_bed({part ? &*part : &frame}, find);
     if (!is_small(bed)) continue;
     if (!part) return bed;

@@ -45,6 +45,9 @@ RimModel rims_of(const FinderCalibration& faces);
 // touch; nothing where the nearest neighbours lie at all distances.
 std::optional<double> touching_radius(const std::vector<Circle>& circles);
 
+// px of the frame: rims of larger disks are seen well.
+inline constexpr double largest_packed_px = 14;
+
 // Where a survey may begin.
 struct PackedStart {
   Polarity polarity = Polarity::automatic;

@@ -11,6 +11,10 @@ double copy_angle(std::size_t copy) {
   return static_cast<double>(copy) * std::numbers::pi / static_cast<double>(stretched_copies);
 }
 
+EdgeMap edges_of(const ScaledPicture& at, float threshold) {
+  return find_edges(at.picture, threshold, at.scale < 1 ? Pixels::doubled : Pixels::own);
+}
+
 EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold) {
   StretchedLines lines(picture, ratio, angle);
   return find_edges(
@@ -22,7 +26,7 @@ PictureMaps::One& PictureMaps::made_for(double radius_px, float threshold) {
   for (One& one : made_)
     if (one.scale == scale && (threshold > 0 ? one.map.edges.threshold == threshold : one.own_threshold)) return one;
   ScaledPicture at = ingest::scaled_for(frame_, radius_px, wanted_px_);
-  EdgeMap edges = find_edges(at.picture, threshold);
+  EdgeMap edges = edges_of(at, threshold);
   made_.push_back({scale, !(threshold > 0), {std::move(at), std::move(edges), {}}});
   return made_.back();
 }

@@ -20,6 +20,9 @@ struct PictureMap {
 inline constexpr std::size_t stretched_copies = 4;
 double copy_angle(std::size_t copy);
 
+// At any scale; `threshold` as in find_edges().
+EdgeMap edges_of(const ScaledPicture& at, float threshold = 0);
+
 // Of a copy.
 EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold);
 

@@ -224,7 +224,7 @@ Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std:
   // Corners show at twice the resolution that circles are searched at.
   const double radius = scaled_for(frame, model.radius_px).scale < 2 ? model.radius_px : 0.5 * model.radius_px;
   const ScaledPicture at = scaled_for(frame, radius);
-  Roundness roundness = roundness_of(find_edges(at.picture), on_the_map(disks, at), model.polarity);
+  Roundness roundness = roundness_of(edges_of(at), on_the_map(disks, at), model.polarity);
   if (auto& side = roundness.round_side; side)
     side->at = side->left_or_right ? at.to_frame_x(side->at) : at.to_frame_y(side->at);
   return roundness;

@@ -9,14 +9,16 @@
 
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-constexpr double gap_reach = 2;            // radii: so far from a bead's rim a circle's rim may be
-constexpr double farthest_fitted = 0.5;    // radii: a fit moves a circle no farther from where votes placed it
+constexpr double gap_reach = 2;  // radii: so far from a bead's rim a circle's rim may be
+// Radii: a fit moves a circle no farther from where votes placed it, and makes it no larger.
+constexpr double farthest_fitted = 0.5, largest_fitted = 1.4;
 constexpr double nearest_rims = 0.8;       // sums of radii: two circles nearer than that overlap
 constexpr double same_bead_radius = 0.12;  // of the radius that beads share, either way
 // In radii of the beads. At half of it, fringes in photoelastic disks are mistaken for beads, unless there is a size
@@ -54,13 +56,13 @@ bool within(double radius, const SizeBand& band) { return radius >= band.from_px
 class GapSearch {
  public:
   // Of a map, where `scale` px of the frame are one. `model`: of the beads found at first. Circles on those of `beads`
-  // are not looked for.
-  GapSearch(const GapMap& map, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
-      : radius_(model.radius_px) {
+  // are not looked for. Those far from all beads are not fitted before there are beads near them.
+  GapSearch(GapMap map, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
+      : map_(std::move(map)), band_(band), radius_(model.radius_px), polarity_(model.polarity) {
     const double tolerated = 1 + 0.4 * same_bead_radius;
     CirclesAsked asked;
-    asked.from_px = std::max(least_gap_radius_px, band.from_px * tolerated / map.scale);
-    asked.to_px = band.to_px / tolerated / map.scale;
+    asked.from_px = std::max(least_gap_radius_px, band.from_px * tolerated / map_.scale);
+    asked.to_px = band.to_px / tolerated / map_.scale;
     if (!(asked.from_px < asked.to_px)) return;
     // Fringes of a disk that is missed look like small beads where edges of either sign count.
     const bool small = band.to_px < smallest_spread * (1 + 2 * same_bead_radius) * model.radius_px;
@@ -69,32 +71,29 @@ class GapSearch {
     asked.least_support = faintest_rim_support;
     if (!small) asked.votes = model.search.votes;
     if (within(model.radius_px, band)) asked.votes.least = model.search.least_votes_in_gaps;
-    double largest = 1;
-    for (const Circle& bead : beads) largest = std::max(largest, bead.radius);
+    const double largest = largest_of(beads);
     const Nearby near(beads.size(), nearest_rims * (largest + band.to_px),
                       [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
-    asked.leave_out = [&](const Circle& circle) {
-      const FramePlace place = map.to_frame(circle.x, circle.y);
-      const double radius = circle.radius * map.scale;
-      return near.any_near(place.x, place.y, [&](std::size_t i) {
-        return std::hypot(beads[i].x - place.x, beads[i].y - place.y) <
-               nearest_rims * (beads[i].radius + radius) - farthest_fitted * radius;
-      });
+    const NearBeads reached(beads, radius_, band.to_px);
+    asked.leave_out = [&](const Circle& peak) {
+      const FramePlace place = map_.to_frame(peak.x, peak.y);
+      const double radius = peak.radius * map_.scale;
+      if (near.any_near(place.x, place.y, [&](std::size_t i) {
+            return std::hypot(beads[i].x - place.x, beads[i].y - place.y) <
+                   nearest_rims * (beads[i].radius + radius) - farthest_fitted * radius;
+          }))
+        return true;
+      const Peak one{peak, place, radius};
+      if (beads.empty() || reached.by(one)) return false;
+      far_.push_back(one);
+      return true;
     };
-    for (Circle& circle : find_circles(map.edges, asked)) {
-      circle.radius *= map.scale;
-      if (!within(circle.radius, band)) continue;
-      const auto [x, y] = map.to_frame(circle.x, circle.y);
-      circle.x = x, circle.y = y;
-      circles_.push_back(circle);
-      largest_ = std::max(largest_, circle.radius);
-    }
+    for (const Circle& circle : find_circles(map_.edges, asked)) add(circle);
   }
 
-  [[nodiscard]] std::vector<Circle> beside(const std::vector<Circle>& beads) const {
-    double largest = radius_;
-    for (const Circle& bead : beads) largest = std::max(largest, bead.radius);
-    const Nearby near(beads.size(), largest + largest_ + gap_reach * radius_,
+  [[nodiscard]] std::vector<Circle> beside(const std::vector<Circle>& beads) {
+    fit_near(beads);
+    const Nearby near(beads.size(), std::max(radius_, largest_of(beads)) + largest_ + gap_reach * radius_,
                       [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
     std::vector<Circle> free;
     for (const Circle& circle : circles_) {
@@ -110,23 +109,97 @@ class GapSearch {
     return without_doubles(std::move(free), nearest_rims);
   }
 
+  // Of a search beside no beads.
   [[nodiscard]] const std::vector<Circle>& all() const { return circles_; }
 
   void leave_out(double from_px, double to_px) {
-    std::erase_if(circles_, [&](const Circle& one) { return one.radius >= from_px && one.radius <= to_px; });
+    wanted_.push_back({from_px, to_px, false});
+    drop_unwanted();
   }
   void keep_only(double from_px, double to_px) {
-    std::erase_if(circles_, [&](const Circle& one) { return one.radius < from_px || one.radius > to_px; });
+    wanted_.push_back({from_px, to_px, true});
+    drop_unwanted();
   }
 
  private:
+  // Where votes place a circle: px of the map, and of the frame.
+  struct Peak {
+    Circle on_map;
+    FramePlace place;
+    double radius = 0;
+  };
+  // Whether the circle that is fitted there may lie beside one of these beads.
+  class NearBeads {
+   public:
+    NearBeads(const std::vector<Circle>& beads, double radius, double largest_peak)
+        : beads_(beads),
+          gap_(gap_reach * radius),
+          near_(beads.size(), largest_of(beads) + gap_ + (farthest_fitted + largest_fitted) * largest_peak,
+                [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); }) {}
+    [[nodiscard]] bool by(const Peak& peak) const {
+      const double reach = gap_ + (farthest_fitted + largest_fitted) * peak.radius;
+      return near_.any_near(peak.place.x, peak.place.y, [&](std::size_t i) {
+        return std::hypot(beads_[i].x - peak.place.x, beads_[i].y - peak.place.y) < beads_[i].radius + reach;
+      });
+    }
+
+   private:
+    const std::vector<Circle>& beads_;
+    double gap_;
+    Nearby near_;
+  };
+  struct Wanted {
+    double from_px, to_px;
+    bool inside;
+    [[nodiscard]] bool holds(double radius) const { return (radius >= from_px && radius <= to_px) == inside; }
+  };
+
+  static double largest_of(const std::vector<Circle>& beads) {
+    double largest = 1;
+    for (const Circle& bead : beads) largest = std::max(largest, bead.radius);
+    return largest;
+  }
+
+  [[nodiscard]] bool is_wanted(double radius) const {
+    return std::all_of(wanted_.begin(), wanted_.end(), [&](const Wanted& one) { return one.holds(radius); });
+  }
+  void drop_unwanted() {
+    std::erase_if(circles_, [&](const Circle& one) { return !is_wanted(one.radius); });
+  }
+
+  void add(Circle circle) {
+    circle.radius *= map_.scale;
+    if (!within(circle.radius, band_) || !is_wanted(circle.radius)) return;
+    const auto [x, y] = map_.to_frame(circle.x, circle.y);
+    circle.x = x, circle.y = y;
+    circles_.push_back(circle);
+    largest_ = std::max(largest_, circle.radius);
+  }
+
+  void fit_near(const std::vector<Circle>& beads) {
+    if (far_.empty()) return;
+    const NearBeads reached(beads, radius_, band_.to_px);
+    std::erase_if(far_, [&](const Peak& peak) {
+      if (!reached.by(peak)) return false;
+      StopQuestion::ask();
+      const Circle circle = fit_circle(map_.edges, peak.on_map, polarity_);
+      if (circle.support >= faintest_rim_support) add(circle);
+      return true;
+    });
+  }
+
+  GapMap map_;
+  SizeBand band_;
   double radius_, largest_ = 1;
+  Polarity polarity_;
   std::vector<Circle> circles_;
+  std::vector<Peak> far_;  // not fitted
+  std::vector<Wanted> wanted_;
 };
 
 // Adds the likely ones to the beads, then those beside these, until there are no more. Returns the sum of the
 // probabilities of what is left.
-double take_likely(const GapSearch& search, const std::vector<double>& probability, const SizeBand* size,
+double take_likely(GapSearch& search, const std::vector<double>& probability, const SizeBand* size,
                    std::vector<Circle>& beads, std::vector<GapCircle>& taken) {
   for (int round = 0;; ++round) {
     double left = 0;
@@ -164,9 +237,9 @@ struct WithCopies {
   WithCopies(PictureMaps& maps, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
       : WithCopies(maps.with_copies(std::sqrt(band.from_px * band.to_px), model.threshold), band, model, beads) {}
 
-  [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) const {
+  [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) {
     std::vector<std::vector<Circle>> by_chance;
-    for (const GapSearch& copy : copies) by_chance.push_back(copy.beside(beads));
+    for (GapSearch& copy : copies) by_chance.push_back(copy.beside(beads));
     return probabilities_by_support(picture.beside(beads), by_chance, Known::beads);
   }
   template <class Change>
@@ -217,7 +290,7 @@ class OtherSizes {
         leave_out(tried_.back());
       }
     }
-    for (const Group& group : groups_) {
+    for (Group& group : groups_) {
       if (group.band.from_px < smallest_spread * model_.radius_px ||
           group.band.to_px > largest_spread * model_.radius_px)
         continue;
@@ -249,16 +322,16 @@ class OtherSizes {
   }
 
   // The radius that most speaks for. Several in a row may hold the same circles: theirs is in the middle of the band.
-  [[nodiscard]] std::optional<double> next_radius() const {
+  [[nodiscard]] std::optional<double> next_radius() {
     struct Seen {
       std::vector<Circle> picture;
       std::vector<std::vector<Circle>> copies;
     };
     double best_gain = 0, best_radius = 0;
-    for (const Group& group : groups_) {
+    for (Group& group : groups_) {
       Seen seen;
       seen.picture = group.search.picture.beside(known_);
-      for (const GapSearch& copy : group.search.copies) seen.copies.push_back(copy.beside(known_));
+      for (GapSearch& copy : group.search.copies) seen.copies.push_back(copy.beside(known_));
       for (double radius = group.band.from_px; radius < group.band.to_px; radius *= size_step) {
         const SizeBand band = around(radius);
         double gain = gain_near(seen.picture, band);
@@ -297,7 +370,7 @@ class OtherSizes {
   }
 
   // Adds to the known beads what is likely in this band, if that is enough to believe in it.
-  std::optional<SizeBand> taken_from(SizeBand band, const WithCopies& search) {
+  std::optional<SizeBand> taken_from(SizeBand band, WithCopies& search) {
     band.probability = search.probabilities(known_);
     std::vector<Circle> with_these = known_;
     std::vector<GapCircle> taken;
@@ -401,7 +474,7 @@ GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, 
 GapModel chances_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, const RimModel& model, bool one_size) {
   GapModel gaps;
   std::vector<Circle> known = beads;
-  const WithCopies same(maps, around(model.radius_px), model, known);
+  WithCopies same(maps, around(model.radius_px), model, known);
   gaps.same_size = same.probabilities(known);
   std::vector<GapCircle> taken;
   take_likely(same.picture, gaps.same_size, nullptr, known, taken);

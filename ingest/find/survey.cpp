@@ -26,8 +26,7 @@ namespace {
 constexpr double alike = 0.97;
 constexpr std::size_t most_examined = 8;  // hypotheses of the census looked at in full
 constexpr double cost_radius_px = 8;
-constexpr double hopeless_share = 0.5;  // of the census's circles, made up by chance: not looked at in full
-constexpr double worth_a_look = 0.15;   // of the best hypothesis's gain
+constexpr double worth_a_look = 0.15;  // of the best hypothesis's gain
 constexpr double few_wrong = 0.1;  // beyond it, beads whose radius is not given must make up a good part of the edges
 constexpr double good_part = 0.15;
 constexpr double least_explained =
@@ -280,11 +279,11 @@ std::vector<Circle> circles_of(const std::vector<RimDisk>& disks) {
 }
 
 // Circles that are beads leave no room between nearest neighbours where beads touch. Circles through what blur leaves
-// of rims in a packed bed do.
-bool leaves_room(const SurveyCandidate& candidate) {
+// of rims in a packed bed do, unless the beads that would touch are too large for that.
+bool leaves_room(const SurveyCandidate& candidate, int reduction) {
   constexpr double room = 1.03;
   const auto touching = touching_radius(circles_of(candidate.disks));
-  return touching && *touching > room * candidate.rims.open_radius_px;
+  return touching && *touching > room * candidate.rims.open_radius_px && *touching <= largest_packed_px * reduction;
 }
 
 // Radii at which the circles of the census would touch, those of the best hypotheses first; last, none.
@@ -488,7 +487,7 @@ void examine(const CircleCensus& census, const SearchedChannels& in, const Surve
   std::optional<ExaminedPicture> last;  // of one channel at a time: maps are large
   for (const CircleHypothesis& hypothesis : census.hypotheses) {
     if (survey.candidates.size() >= most) break;
-    if (hypothesis.by_chance > hopeless_share * hypothesis.circles) continue;
+    if (hypothesis.hopeless()) continue;
     if (hypothesis.gain_px < worth_a_look * census.hypotheses.front().gain_px) continue;
     const Channel channel = in.channels[hypothesis.channel]->channel;
     if (!asked.options.radius_px && is_known(survey, hypothesis, channel, asked.reduction)) continue;
@@ -521,7 +520,8 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
                    });
   survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
   if (effort == Effort::glance && !survey.found) return survey;
-  if (!survey.found || (!survey.candidates.front().region && leaves_room(survey.candidates.front()))) {
+  if (!survey.found ||
+      (!survey.candidates.front().region && leaves_room(survey.candidates.front(), frames.reduction))) {
     const std::size_t channel = census.hypotheses.empty() ? 0 : census.hypotheses.front().channel;
     SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs};
     consider_packed_bed(survey, picture, starts_from(census, options, frames.reduction), options);
