@@ -14,6 +14,9 @@ namespace shakebed::ingest {
 
 namespace {
 
+// Of the typical distance of nearest neighbours, where these do not overlap: two disks so near are not two beads.
+constexpr double much_nearer = 0.75;
+
 bool from_top(const ModelDisk& one, const ModelDisk& other) {
   if (one.y != other.y) return one.y < other.y;
   return one.x < other.x;
@@ -150,6 +153,36 @@ std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, 
   disks.insert(disks.end(), added.begin(), added.end());
   std::sort(disks.begin(), disks.end(), from_top);
   return changed;
+}
+
+std::vector<DoubledDisks> doubled_disks(std::vector<ModelDisk>& disks, double radius) {
+  const double far = 4 * radius;
+  std::vector<double> nearest(disks.size(), far);
+  std::vector<std::size_t> which(disks.size(), 0);
+  nearby(disks, far).pairs([&](std::size_t a, std::size_t b) {
+    const double away = std::hypot(disks[a].x - disks[b].x, disks[a].y - disks[b].y);
+    if (away < nearest[a]) nearest[a] = away, which[a] = b;
+    if (away < nearest[b]) nearest[b] = away, which[b] = a;
+    return false;
+  });
+  std::vector<DoubledDisks> doubled;
+  const double typical = median_of(nearest);
+  if (typical < 2 * radius) return doubled;
+  std::vector<std::uint8_t> out(disks.size(), 0);
+  for (std::size_t a = 0; a < disks.size(); ++a) {
+    const std::size_t b = which[a];
+    if (nearest[a] > much_nearer * typical || which[b] != a || b < a) continue;
+    const ModelDisk &one = disks[a], &other = disks[b];
+    const double share = one.amplitude / std::max(1e-6, one.amplitude + other.amplitude);
+    ModelDisk merged;
+    merged.x = share * one.x + (1 - share) * other.x;
+    merged.y = share * one.y + (1 - share) * other.y;
+    doubled.push_back({one, other, merged});
+    out[a] = out[b] = 1;
+  }
+  std::size_t at = 0;
+  std::erase_if(disks, [&](const ModelDisk&) { return out[at++] != 0; });
+  return doubled;
 }
 
 bool settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius) {

@@ -36,6 +36,13 @@ std::size_t prune(JointFit& fit, std::vector<ModelDisk>& disks, double radius, d
 // places were looked at again.
 std::size_t repair(JointFit& fit, std::vector<ModelDisk>& disks, double radius, double noise);
 
+// Two disks much nearer to one another than the beads of this bed are to their neighbours, and one between them.
+struct DoubledDisks {
+  ModelDisk one, other, merged;
+};
+// Takes such pairs out of `disks`, not out of the fit. None where beads typically overlap. They have been judged.
+std::vector<DoubledDisks> doubled_disks(std::vector<ModelDisk>& disks, double radius);
+
 // After a few sweeps: beads moved by repair() that explain no more than before go back where they were.
 // True if there was one.
 bool settle(JointFit& fit, std::vector<ModelDisk>& disks, double radius);

@@ -61,6 +61,7 @@ class FrameFinder {
     fit_.set_table(&exact_);
     fit_.reset(flat_, disks_);
     fit_all();
+    merge_doubled();
     const bool pruned = prune_fitted();
     const bool bands = take_out_bands();
     std::vector<double> explained;
@@ -115,6 +116,36 @@ class FrameFinder {
     light = {light.shift + light.gain * own.shift, light.gain * own.gain};
     flat_ = flatten(seen_, calibration_.light, light);
     fit_.reset(flat_, disks_);
+  }
+
+  // One bead that was taken for two: they lie much nearer to one another than beads of this bed do. One disk in their
+  // place stays where it explains more than either of them did.
+  void merge_doubled() {
+    fit_.judge(disks_, radius_ + 1);
+    std::vector<DoubledDisks> doubled = doubled_disks(disks_, radius_);
+    if (doubled.empty()) return;
+    std::vector<ModelDisk> touched;
+    for (const DoubledDisks& pair : doubled) {
+      fit_.subtract(pair.one.x, pair.one.y, -1.0F);
+      fit_.subtract(pair.other.x, pair.other.y, -1.0F);
+      fit_.subtract(pair.merged.x, pair.merged.y, 1.0F);
+      disks_.push_back(pair.merged);
+      touched.push_back(pair.merged);
+    }
+    wake_near(touched);
+    fit_again();
+    const std::size_t first = disks_.size() - doubled.size();
+    for (std::size_t k = 0; k < doubled.size(); ++k) {
+      ModelDisk& merged = disks_[first + k];
+      if (merged.explained > std::max(doubled[k].one.explained, doubled[k].other.explained)) continue;
+      fit_.subtract(merged.x, merged.y, -1.0F);
+      fit_.subtract(doubled[k].one.x, doubled[k].one.y, 1.0F);
+      fit_.subtract(doubled[k].other.x, doubled[k].other.y, 1.0F);
+      merged = doubled[k].one;
+      disks_.push_back(doubled[k].other);
+    }
+    wake_near(touched);
+    fit_again();
   }
 
   bool prune_fitted() {

@@ -37,6 +37,10 @@ constexpr double well_explained =
     0.35;  // of the edges: where most beads were found by rims 0.35 to 0.85, else 0.10 to 0.34
 // Radii: beads are looked for no farther from the region given.
 constexpr double beyond_region = 4;
+// Radii round a face without a rim in which its neighbours are counted; those with a rim are at least so many, and so
+// many times those without. Two that are nearer than this may be faces of one bead.
+constexpr double company_reach = 2.8, nearest_company = 1.75;
+constexpr std::size_t fewest_company = 3, share_of_company = 2;
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
 Circle place_of(const FoundDisk& disk) {
@@ -45,6 +49,33 @@ Circle place_of(const FoundDisk& disk) {
   circle.y = disk.y_px;
   circle.radius = disk.radius_px;
   return circle;
+}
+
+// What a face is by its rim, or by that of its neighbours where it has none: blur, or a neighbour, hides the rims of
+// small beads. Faces that tile something else have one another for neighbours.
+enum class Standing { has_rim, among_beads, doubled_among_beads, alone };
+// `rims` are those at the places of the faces.
+std::vector<Standing> standing_of(const std::vector<Circle>& faces, const std::vector<Circle>& rims) {
+  std::vector<Standing> standing(faces.size(), Standing::has_rim);
+  if (faces.empty()) return standing;
+  const auto rimless = [&](std::size_t i) { return rims[i].support < support_without_rim; };
+  const double radius = faces.front().radius;
+  const Nearby near(faces.size(), company_reach * radius,
+                    [&](std::size_t i) { return std::pair(faces[i].x, faces[i].y); });
+  for (std::size_t k = 0; k < faces.size(); ++k) {
+    if (!rimless(k)) continue;
+    std::size_t with = 0, without = 0;
+    bool doubled = false;
+    near.any_near(faces[k].x, faces[k].y, [&](std::size_t i) {
+      if (i == k) return false;
+      ++(rimless(i) ? without : with);
+      doubled = doubled || std::hypot(faces[i].x - faces[k].x, faces[i].y - faces[k].y) < nearest_company * radius;
+      return false;
+    });
+    const bool among = with >= fewest_company && with >= share_of_company * without;
+    standing[k] = !among ? Standing::alone : doubled ? Standing::doubled_among_beads : Standing::among_beads;
+  }
+  return standing;
 }
 
 // A face whose rim is doubtful is a bead where beads are.
@@ -66,15 +97,17 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
   std::vector<Circle> places;
   for (const FoundDisk& disk : found.disks) places.push_back(place_of(disk));
   const std::vector<Circle> circles = rims_at(frame, rims, places);
+  const std::vector<Standing> standing = standing_of(places, circles);
   std::vector<FoundDisk> kept;
   for (std::size_t k = 0; k < circles.size(); ++k) {
     FoundDisk disk = found.disks[k];
     // A cut bead may show too little of its rim: it is doubtful, and stays where beads are.
-    if (circles[k].support < support_without_rim && !disk.cut) {
+    const bool stands = standing[k] == Standing::has_rim || standing[k] == Standing::among_beads;
+    if (!stands && !disk.cut) {
       ++found.rejected;
       continue;
     }
-    const bool whole = disk.quality >= whole_quality && circles[k].support >= support_without_rim;
+    const bool whole = stands && disk.quality >= whole_quality;
     disk.probability = std::max(rims.probability_of(circles[k].support), whole ? 0.95 : 0.5);
     kept.push_back(disk);
   }
@@ -95,7 +128,7 @@ struct Agreement {
   double missed = 0;                  // share of the sure rims that no face has
   double missed_beads = 0;            // that rims show and faces do not
   double rimless = 0;                 // share of the faces
-  std::vector<Circle> faces, no_rim;  // whole faces with a rim, and without
+  std::vector<Circle> faces, no_rim;  // whole faces with a rim or among such, and others beside them
   std::vector<Circle> all;            // these and those that are cut
   [[nodiscard]] bool good() const { return missed <= most_missed_faces && rimless <= most_rimless; }
 };
@@ -123,10 +156,15 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
     if (!disk.cut) places.push_back(place_of(disk));
   }
   const std::vector<Circle> circles = rims_at(frame, rims.model, places);
-  for (std::size_t k = 0; k < places.size(); ++k)
-    (circles[k].support < support_without_rim ? agreement.no_rim : agreement.faces).push_back(places[k]);
-  if (!places.empty())
-    agreement.rimless = static_cast<double>(agreement.no_rim.size()) / static_cast<double>(places.size());
+  const std::vector<Standing> standing = standing_of(places, circles);
+  double rimless = 0;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const bool stands = standing[k] == Standing::has_rim || standing[k] == Standing::among_beads;
+    if (stands) agreement.faces.push_back(places[k]);
+    if (standing[k] == Standing::alone) agreement.no_rim.push_back(places[k]);
+    rimless += stands ? 0 : 1;
+  }
+  if (!places.empty()) agreement.rimless = rimless / static_cast<double>(places.size());
   return agreement;
 }
 

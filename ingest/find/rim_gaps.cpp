@@ -197,16 +197,16 @@ class GapSearch {
   std::vector<Wanted> wanted_;
 };
 
-// Adds the likely ones to the beads, then those beside these, until there are no more. Returns the sum of the
-// probabilities of what is left.
+// Adds those of at least the `least` probability to the beads, then those beside these, until there are no more.
+// Returns the sum of the probabilities of what is left.
 double take_likely(GapSearch& search, const std::vector<double>& probability, const SizeBand* size,
-                   std::vector<Circle>& beads, std::vector<GapCircle>& taken) {
+                   std::vector<Circle>& beads, std::vector<GapCircle>& taken, double least = least_gap_probability) {
   for (int round = 0;; ++round) {
     double left = 0;
     const std::size_t before = taken.size();
     for (const Circle& circle : search.beside(beads)) {
       const double its = probability_at(probability, circle.support);
-      if (its < least_gap_probability)
+      if (its < least)
         left += its;
       else
         taken.push_back({circle, its, size});
@@ -454,20 +454,26 @@ GapCircles circles_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, 
   for (const GapCircle& one : out.circles) known.push_back(one.circle);
   for (std::size_t i = 0; i < beads.size(); ++i)
     if (!std::binary_search(out.displaced.begin(), out.displaced.end(), i)) known.push_back(beads[i]);
-  const auto take = [&](const SizeBand& band, const std::vector<double>& probability, const SizeBand* size,
-                        const std::vector<SizeBand>& before) {
-    const PictureMap& map = maps.scaled_for(std::sqrt(band.from_px * band.to_px), model.threshold);
-    GapSearch search(map_of(map), band, model, known);
-    for (const SizeBand& other : before) search.leave_out(other.from_px, other.to_px);
-    out.expected_missed += take_likely(search, probability, size, known, out.circles);
+  struct Searched {
+    GapSearch search;
+    const std::vector<double>& probability;
+    const SizeBand* size;
   };
+  std::vector<Searched> bands;
   std::vector<SizeBand> before;
-  take(around(model.radius_px), model.gaps->same_size, nullptr, before);
-  before.push_back(around(model.radius_px));
-  for (const SizeBand& size : model.gaps->other_sizes) {
-    take(size, size.probability, &size, before);
-    before.push_back(size);
-  }
+  const auto search = [&](const SizeBand& band, const std::vector<double>& probability, const SizeBand* size) {
+    const PictureMap& map = maps.scaled_for(std::sqrt(band.from_px * band.to_px), model.threshold);
+    bands.push_back({GapSearch(map_of(map), band, model, known), probability, size});
+    for (const SizeBand& other : before) bands.back().search.leave_out(other.from_px, other.to_px);
+    before.push_back(band);
+  };
+  search(around(model.radius_px), model.gaps->same_size, nullptr);
+  for (const SizeBand& size : model.gaps->other_sizes) search(size, size.probability, &size);
+  // A doubtful circle of one size is not to take the place of a sure one of another.
+  if (bands.size() > 1)
+    for (Searched& band : bands) take_likely(band.search, band.probability, band.size, known, out.circles, sure_rival);
+  for (Searched& band : bands)
+    out.expected_missed += take_likely(band.search, band.probability, band.size, known, out.circles);
   return out;
 }
 

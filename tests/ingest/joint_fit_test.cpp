@@ -510,6 +510,28 @@ TEST(BeadSet, IsRepairedByWhatShowsInTheResidual) {
   EXPECT_EQ(disks.size(), 4U);
 }
 
+// Two disks three eighths of the typical distance apart are taken out for one between them, where the brighter is;
+// those as near as others are, and all where most overlap, stay.
+TEST(BeadSet, OffersOneDiskInPlaceOfTwoThatAreMuchNearerThanOthers) {
+  const double apart = 2.4 * fit_radius;
+  std::vector<ModelDisk> disks;
+  for (int k = 0; k < 12; ++k) disks.push_back(model_at(20 + apart * (k % 4), 20 + apart * (k / 4)));
+  disks.push_back(model_at(disks[5].x + 0.74 * apart, disks[5].y));
+  disks.back().amplitude = 0.5;
+  disks.erase(disks.begin() + 6);
+  std::vector<ModelDisk> left = disks;
+  const std::vector<DoubledDisks> doubled = doubled_disks(left, fit_radius);
+  ASSERT_EQ(doubled.size(), 1U);
+  EXPECT_EQ(left.size(), 10U);
+  EXPECT_NEAR(doubled[0].merged.x, disks[5].x + 0.74 * apart / 3, 1e-9);
+  EXPECT_NEAR(doubled[0].merged.y, disks[5].y, 1e-9);
+  disks.back().x = disks[5].x + 0.76 * apart;
+  EXPECT_TRUE(doubled_disks(disks, fit_radius).empty());
+  for (ModelDisk& disk : disks) disk.x *= 0.8, disk.y *= 0.8;
+  disks.back().x = disks[5].x + 0.5 * apart;
+  EXPECT_TRUE(doubled_disks(disks, fit_radius).empty()) << "most are nearer than a diameter";
+}
+
 // A suspect in whose place nothing is seen goes back; one cut by a side of the frame is none.
 TEST(BeadSet, KeepsASuspectInWhosePlaceNothingShows) {
   for (const std::array<double, 2>& cut : {std::array{5.5, 40.0}, {74.5, 40.0}, {40.0, 5.5}, {40.0, 74.5}}) {

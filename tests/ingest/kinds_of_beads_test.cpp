@@ -534,6 +534,29 @@ TEST(FacesWithoutARim, AreNoBeads) {
   EXPECT_EQ(find_beads(frame, finder, {}).disks.size(), 20U);
 }
 
+// One whose rim is too faint to be seen is a bead where its neighbours have rims, and none elsewhere.
+TEST(FacesWithoutARim, AreBeadsAmongBeads) {
+  for (const bool among : {true, false}) {
+    std::vector<RenderedDisk> disks = strewn_disks(5, 4, 22, 9);
+    if (!among) disks[7].x_px = 190, disks[7].y_px = 140;
+    GrayFrame frame = strewn_frame(disks, 220, 170);
+    FinderCalibration finder;
+    ASSERT_EQ(find_disks(frame, {.radius_px = 9}, &finder).disks.size(), 20U);
+    const double ground = 150;
+    for (int row = 0; row < frame.height; ++row)
+      for (int column = 0; column < frame.width; ++column)
+        if (std::hypot(column - disks[7].x_px, row - disks[7].y_px) < 11)
+          test::set(frame, column, row, ground + 0.65 * (static_cast<double>(frame.at(column, row)) - ground));
+    finder.rims = learn_rims(frame, Polarity::dark_beads, 9).model;
+    finder.rims_to_be_checked = true;
+    std::vector<Circle> places;
+    for (const RenderedDisk& disk : disks) places.push_back({disk.x_px, disk.y_px, 9});
+    while (rims_at(frame, *finder.rims, places)[7].support >= 0.2) finder.rims->threshold *= 1.05F;
+    const FindResult found = find_beads(frame, finder, {});
+    EXPECT_EQ(found.disks.size(), among ? 20U : 19U);
+  }
+}
+
 // --- missed_beads.hpp ------------------------------------------------------------------------------------------------
 
 // A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii of the beads. Here four

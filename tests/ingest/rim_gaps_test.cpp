@@ -69,19 +69,14 @@ class GapsByHand {
 
   // Likely ones, those beside these, and so on; nine times at most.
   std::vector<GapCircle> take(const Circles& circles, const std::vector<double>& chance, Circles& beads,
-                              double* left = nullptr) const {
+                              double least = 0.5) const {
     std::vector<GapCircle> taken;
     for (int round = 0; round < 9; ++round) {
       const std::size_t before = taken.size();
-      double unlikely = 0;
       for (const Circle& one : beside(circles, beads)) {
         const double its = probability_at(chance, one.support);
-        if (its >= 0.5)
-          taken.push_back({one, its});
-        else
-          unlikely += its;
+        if (its >= least) taken.push_back({one, its});
       }
-      if (left) *left = unlikely;
       for (std::size_t k = before; k < taken.size(); ++k) beads.push_back(taken[k].circle);
       if (taken.size() == before) break;
     }
@@ -249,18 +244,23 @@ std::size_t expect_same_gaps(const GrayFrame& frame, RimModel model, Circles bea
       EXPECT_NEAR(gaps.other_sizes[k].probability[i], others[k].probability[i], 1e-12) << name << ' ' << i;
   }
   model.gaps = gaps;
-  // Then those of the beads' size are taken, then those of each other size but for the sizes before.
+  // Then the sure ones are taken: of the beads' size, then of each other size but for the sizes before. Then the
+  // others.
   const GapCircles found = circles_in_gaps(maps, beads, model);
   if (!found.displaced.empty()) return others.size();
-  std::vector<GapCircle> expected =
-      by_hand.take(by_hand.seen(Sizes::around(model.radius_px), beads)[0], gaps.same_size, beads);
+  std::vector<Circles> seen = {by_hand.seen(Sizes::around(model.radius_px), beads)[0]};
+  std::vector<std::vector<double>> chances = {gaps.same_size};
   std::vector<Sizes> before = {Sizes::around(model.radius_px)};
   for (const SizeBand& band : gaps.other_sizes) {
-    auto circles = by_hand.seen({band.from_px, band.to_px}, beads)[0];
-    for (const Sizes& one : before) std::erase_if(circles, [&](const Circle& c) { return one.hold(c.radius); });
-    for (const GapCircle& one : by_hand.take(circles, band.probability, beads)) expected.push_back(one);
+    seen.push_back(by_hand.seen({band.from_px, band.to_px}, beads)[0]);
+    for (const Sizes& one : before) std::erase_if(seen.back(), [&](const Circle& c) { return one.hold(c.radius); });
+    chances.push_back(band.probability);
     before.push_back({band.from_px, band.to_px});
   }
+  std::vector<GapCircle> expected;
+  for (const double least : {0.9, 0.5})
+    for (std::size_t k = 0; k < seen.size(); ++k)
+      for (const GapCircle& one : by_hand.take(seen[k], chances[k], beads, least)) expected.push_back(one);
   expect_same_circles(found.circles, expected, name);
   return others.size();
 }
@@ -334,6 +334,28 @@ TEST(RimGaps, GiveThePlacesOfPoorCirclesToLargerBeads) {
   EXPECT_TRUE(has_large(poor));
   EXPECT_FALSE(has_large(good));
   EXPECT_EQ(poor.circles.size(), good.circles.size() + 1);
+}
+
+// Where all circles of the beads' size are doubtful, those of the other size that are sure keep their places.
+TEST(RimGaps, GiveThePlacesOfDoubtfulCirclesToSureOnesOfAnotherSize) {
+  MixedBed bed = mixed_bed({9.6}, 7);
+  PictureMaps maps(bed.frame, 8);
+  const auto large_found = [&](double same, double other) {
+    GapModel gaps;
+    gaps.same_size.assign(21, same);
+    SizeBand band;
+    band.from_px = 9.1, band.to_px = 10.5;
+    band.probability.assign(21, other);
+    gaps.other_sizes = {band};
+    bed.model.gaps = gaps;
+    std::size_t count = 0;
+    for (const GapCircle& one : circles_in_gaps(maps, bed.known, bed.model).circles) count += one.circle.radius > 9.1;
+    return count;
+  };
+  const std::size_t large = large_found(0, 0.95);
+  EXPECT_GE(large, 6U);
+  EXPECT_EQ(large_found(0.6, 0.95), large);
+  EXPECT_LT(large_found(0.95, 0.95), large) << "circles of the beads' size are drawn round larger beads, too";
 }
 
 }  // namespace
