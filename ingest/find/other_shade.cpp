@@ -3,21 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <random>
 #include <utility>
 #include <vector>
 
 #include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
-#include "ingest/find/candidates.hpp"
+#include "ingest/find/beside_beads.hpp"
 #include "ingest/find/circle_census.hpp"
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/missed_beads.hpp"
-#include "ingest/find/nearby.hpp"
+#include "ingest/find/painted_over.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "statistics/ranks.hpp"
 #include "statistics/text.hpp"
@@ -28,15 +26,6 @@ namespace {
 
 // Beyond the rim of a bead found its blurred edge is painted over, too [edge widths of faces; radii, px of rims].
 constexpr double shade_margin_edges = 2, margin_radii = 0.06, shade_margin_px = 1;
-// What is behind the beads: the level of this rank among the pixels that no bead found covers, the darkest being 0, in
-// cells so wide [radii]. Beads of the other shade, which are brighter or darker, may be most of these pixels.
-constexpr double rank_behind_bright = 0.15, rank_behind_dark = 0.85, cell_radii = 4;
-constexpr std::size_t fewest_in_cell = 40, most_in_cell = 600;
-// Sums of radii: a bead nearer than that to another overlaps it.
-constexpr double nearest_shade_centres = 0.8;
-// Radii of the bead found: a rim that is so near to it is no evidence. Share of the rest in which edges must be met,
-// and share of the whole rim that the rest must be.
-constexpr double near_rim = 0.12, least_own_support = 0.6, least_open = 0.15;
 // Beads of another shade are accepted when at least this number is expected, and this share of the beads found.
 constexpr double fewest_of_a_shade = 3, least_share_of_a_shade = 0.03;
 // Radii of the beads found: sizes of the others, and how many are looked for.
@@ -55,169 +44,10 @@ double margin_of(const FinderCalibration& finder) {
   return finder.by_rims ? shade_margin_px + margin_radii * finder.radius_px : shade_margin_edges * finder.edge_width_px;
 }
 
-// Levels behind the beads in cells of the frame, and between the middles of the cells.
-class Behind {
- public:
-  Behind(const GrayFrame& frame, const std::vector<std::uint8_t>& hidden, double cell_px, double rank)
-      : cell_(std::max(4, static_cast<int>(cell_px))),
-        columns_((frame.width + cell_ - 1) / cell_),
-        rows_((frame.height + cell_ - 1) / cell_) {
-    std::vector<std::optional<float>> known;
-    for (int row = 0; row < rows_; ++row)
-      for (int column = 0; column < columns_; ++column) known.push_back(level_in(frame, hidden, column, row, rank));
-    known_ = std::any_of(known.begin(), known.end(), [](const auto& one) { return one.has_value(); });
-    if (known_) fill(std::move(known));
-  }
-
-  [[nodiscard]] bool known() const { return known_; }
-
-  [[nodiscard]] float at(int x, int y) const {
-    const double u = std::clamp((x + 0.5) / cell_ - 0.5, 0.0, columns_ - 1.0);
-    const double v = std::clamp((y + 0.5) / cell_ - 0.5, 0.0, rows_ - 1.0);
-    const int left = std::min(static_cast<int>(u), std::max(0, columns_ - 2));
-    const int top = std::min(static_cast<int>(v), std::max(0, rows_ - 2));
-    const int right = std::min(left + 1, columns_ - 1), below = std::min(top + 1, rows_ - 1);
-    const auto across = static_cast<float>(u - left), down = static_cast<float>(v - top);
-    return (1 - down) * ((1 - across) * level(left, top) + across * level(right, top)) +
-           down * ((1 - across) * level(left, below) + across * level(right, below));
-  }
-
- private:
-  [[nodiscard]] std::size_t index(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
-  }
-  [[nodiscard]] float level(int column, int row) const { return levels_[index(column, row)]; }
-
-  [[nodiscard]] std::optional<float> level_in(const GrayFrame& frame, const std::vector<std::uint8_t>& hidden,
-                                              int column, int row, double rank) const {
-    const auto step = static_cast<std::size_t>(
-        std::max(1.0, std::sqrt(static_cast<double>(cell_) * cell_ / static_cast<double>(most_in_cell))));
-    std::vector<float> levels;
-    const int bottom = std::min(frame.height, (row + 1) * cell_), right = std::min(frame.width, (column + 1) * cell_);
-    for (int y = row * cell_; y < bottom; y += static_cast<int>(step))
-      for (int x = column * cell_; x < right; x += static_cast<int>(step)) {
-        const auto at =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x);
-        if (hidden[at] == 0 && !unseen(frame.pixels[at])) levels.push_back(frame.pixels[at]);
-      }
-    if (levels.size() < fewest_in_cell) return std::nullopt;
-    return quantile_of(std::move(levels), rank);
-  }
-
-  // Cells that beads cover become the mean of their neighbours, from the known ones outwards.
-  void fill(std::vector<std::optional<float>> known) {
-    for (bool all = false; !all;) {
-      all = true;
-      const auto before = known;
-      for (int row = 0; row < rows_; ++row)
-        for (int column = 0; column < columns_; ++column) {
-          if (before[index(column, row)]) continue;
-          float sum = 0, count = 0;
-          for (int y = std::max(0, row - 1); y <= std::min(rows_ - 1, row + 1); ++y)
-            for (int x = std::max(0, column - 1); x <= std::min(columns_ - 1, column + 1); ++x)
-              if (const auto& one = before[index(x, y)]) sum += *one, ++count;
-          if (count > 0)
-            known[index(column, row)] = sum / count;
-          else
-            all = false;
-        }
-    }
-    for (const auto& one : known) levels_.push_back(*one);
-  }
-
-  int cell_, columns_, rows_;
-  bool known_ = false;
-  std::vector<float> levels_;
-};
-
-std::vector<std::uint8_t> covered_by(const GrayFrame& frame, const std::vector<FoundDisk>& disks, double margin) {
-  std::vector<std::uint8_t> hidden(frame.pixels.size(), 0);
-  for (const FoundDisk& disk : disks) {
-    const double reach = disk.radius_px + margin;
-    const int top = std::max(0, static_cast<int>(std::ceil(disk.y_px - reach)));
-    const int bottom = std::min(frame.height - 1, static_cast<int>(std::floor(disk.y_px + reach)));
-    for (int row = top; row <= bottom; ++row) {
-      const double half = std::sqrt(std::max(0.0, reach * reach - (row - disk.y_px) * (row - disk.y_px)));
-      const int left = std::max(0, static_cast<int>(std::ceil(disk.x_px - half)));
-      const int right = std::min(frame.width - 1, static_cast<int>(std::floor(disk.x_px + half)));
-      const auto line = hidden.begin() + static_cast<std::ptrdiff_t>(row) * frame.width;
-      if (left <= right) std::fill(line + left, line + right + 1, std::uint8_t{1});
-    }
-  }
-  return hidden;
-}
-
-// The frame with the beads painted over by what is behind them, as noisy as the rest. Nothing when they cover all of
-// it.
-std::optional<GrayFrame> painted_over(const GrayFrame& frame, const std::vector<FoundDisk>& disks, double margin,
-                                      Polarity left) {
-  double radius = 1;
-  for (const FoundDisk& disk : disks) radius = std::max(radius, disk.radius_px);
-  const std::vector<std::uint8_t> hidden = covered_by(frame, disks, margin);
-  const Behind behind(frame, hidden, cell_radii * radius,
-                      left == Polarity::bright_beads ? rank_behind_bright : rank_behind_dark);
-  if (!behind.known()) return std::nullopt;
-  GrayFrame painted = frame;
-  const auto noise = static_cast<float>(noise_of(frame));
-  std::minstd_rand random(1);
-  const auto part = [&] { return static_cast<float>(random()) / static_cast<float>(std::minstd_rand::max()); };
-  for (int row = 0; row < frame.height; ++row)
-    for (int column = 0; column < frame.width; ++column) {
-      const auto at =
-          static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(column);
-      if (hidden[at] == 0 || unseen(frame.pixels[at])) continue;
-      const float normal = 1.7320508F * ((part() + part() + part() + part()) - 2.0F);
-      painted.pixels[at] = behind.at(column, row) + noise * normal;
-    }
-  return painted;
-}
-
-// Places that the beads found leave free.
-class FreeOf {
- public:
-  explicit FreeOf(const std::vector<FoundDisk>& disks) : disks_(disks), near_(make_near(disks)) {}
-
-  [[nodiscard]] bool overlapped(double x, double y, double radius) const {
-    return near_.any_near(x, y, [&](std::size_t i) {
-      return std::hypot(disks_[i].x_px - x, disks_[i].y_px - y) <
-             nearest_shade_centres * (disks_[i].radius_px + radius);
-    });
-  }
-
-  // Whether a place is none of a bead found, nor of its rim.
-  [[nodiscard]] bool beside_rims(double x, double y) const {
-    return !near_.any_near(x, y, [&](std::size_t i) {
-      return std::hypot(disks_[i].x_px - x, disks_[i].y_px - y) < (1 + near_rim) * disks_[i].radius_px;
-    });
-  }
-
-  // Whether edges that are none of the beads found make up the circle's rim.
-  [[nodiscard]] bool has_own_rim(const Circle& circle) const {
-    int open = 0, met = 0;
-    for (int k = 0; k < circle.directions; ++k) {
-      const double angle = 2 * std::numbers::pi * k / circle.directions;
-      const double x = circle.x + circle.radius * std::cos(angle), y = circle.y + circle.radius * std::sin(angle);
-      if (!beside_rims(x, y)) continue;
-      ++open;
-      met += static_cast<int>(circle.met >> static_cast<unsigned>(k) & 1U);
-    }
-    return open >= least_open * circle.directions && met >= least_own_support * open;
-  }
-
- private:
-  static Nearby make_near(const std::vector<FoundDisk>& disks) {
-    double largest = 1;
-    for (const FoundDisk& disk : disks) largest = std::max(largest, disk.radius_px);
-    return {disks.size(), 4 * largest, [&](std::size_t i) { return std::pair(disks[i].x_px, disks[i].y_px); }};
-  }
-  const std::vector<FoundDisk>& disks_;
-  Nearby near_;
-};
-
 // Of the beads found in the painted frame, those that are beads of the frame.
 void keep_own(const GrayFrame& painted, const FinderCalibration& other, const std::vector<FoundDisk>& found,
               FindResult& more) {
-  const FreeOf free(found);
+  const BesideBeads free(found);
   std::vector<Circle> places;
   for (const FoundDisk& disk : more.disks) {
     places.emplace_back();
@@ -258,7 +88,7 @@ bool enough(double expected, const std::vector<FoundDisk>& found) {
 // With this radius, to begin with.
 void look_with(double radius_px, const std::vector<FoundDisk>& found, PictureMaps& maps, SeenShade& seen) {
   const LearnedRims rims = learn_rims(maps, seen.beads.polarity, radius_px, Known::radius);
-  const FreeOf free(found);
+  const BesideBeads free(found);
   double expected = 0;
   for (const RimDisk& disk : rims.disks)
     if (!free.overlapped(disk.circle.x, disk.circle.y, disk.circle.radius) && free.has_own_rim(disk.circle))
@@ -273,7 +103,7 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
   const ScaledPicture at = scaled_for(painted, radius_px);
   EdgeMap edges = edges_of(at);
   const float plain = plain_edge * edges.threshold;
-  const FreeOf free(found);
+  const BesideBeads free(found);
   std::erase_if(edges.ridge, [&](const RidgePixel& pixel) {
     return edges.slope(edges.at(static_cast<int>(pixel.x), static_cast<int>(pixel.y))) < plain ||
            !free.beside_rims(at.to_frame_x(static_cast<double>(pixel.x)), at.to_frame_y(static_cast<double>(pixel.y)));
@@ -289,7 +119,7 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
   std::erase_if(circles, [&](const Circle& circle) {
     return free.overlapped(circle.x, circle.y, circle.radius) || !free.has_own_rim(circle);
   });
-  return static_cast<double>(without_doubles(std::move(circles), nearest_shade_centres).size()) >= beads;
+  return static_cast<double>(without_doubles(std::move(circles), nearest_free_centres).size()) >= beads;
 }
 
 // Of the same size as the beads found, else of the size of which most circles are seen.
@@ -381,7 +211,7 @@ bool are_gaps(const GrayFrame& frame, double margin, const std::vector<FoundDisk
   for (const FoundDisk& disk : all) radius = std::max(radius, disk.radius_px);
   const std::vector<std::uint8_t> hidden = covered_by(frame, all, margin + open_radii * radius);
   constexpr double middle = 0.5;
-  const Behind open(frame, hidden, cell_radii * radius, middle);
+  const LevelsBehind open(frame, hidden, cell_radii * radius, middle);
   if (!open.known()) return false;
   const auto step = [&](const std::vector<FoundDisk>& disks) {
     return median_inside(frame, disks,

@@ -10,6 +10,7 @@
 #include "ingest/find/bead_profile.hpp"
 #include "ingest/find/blurred_disk.hpp"
 #include "ingest/find/profile_samples.hpp"
+#include "ingest/find/rim_trials.hpp"
 #include "ingest/frames/smooth_field.hpp"
 
 namespace shakebed::ingest {
@@ -72,12 +73,6 @@ std::vector<Shapes> shapes_at(double radius, double edge, const std::vector<doub
   }
   return shapes;
 }
-
-// What is fitted: levels at distances from the centre, and the weight of each.
-struct RimData {
-  std::vector<double> distance, level, weight;
-  double offset_weight = 0;  // of the level outside being 0
-};
 
 // Radius and edge by damped least squares (Levenberg and Marquardt); `use` says which of the shapes, and the level
 // outside, take part.
@@ -209,55 +204,6 @@ RimFit fit_rim_with(const RimData& data, double radius_guess, double edge_guess,
   return fit;
 }
 
-RimData rim_data(const BeadProfile& profile, double radius, double edge) {
-  RimData data;
-  const double reach = profile.reach_px();
-  const double low = std::max(0.0, std::min(0.55 * radius, radius - 2.5 * edge));
-  const double spacing = std::clamp(edge / 4, 0.08, (reach - low) / 30);
-  for (double r = low + 0.5 * spacing; r < reach; r += spacing) {
-    data.distance.push_back(r);
-    data.level.push_back(value_at(profile.level, profile.step_px, r));
-  }
-  data.weight = data.distance;  // pixels at this distance
-  return data;
-}
-
-// The weights of a profile's points: from the number of pixels at one distance and the accuracy of the learned profile.
-// At a sharp edge square pixels see every direction differently.
-void weigh(RimData& data, const RimConditions& conditions) {
-  constexpr double sharp = 0.6;
-  const double learning = conditions.edge_px < sharp ? 3e-3 : 3e-4;
-  const double spacing = data.distance[1] - data.distance[0];
-  for (std::size_t i = 0; i < data.distance.size(); ++i) {
-    const double pixels =
-        std::max(1.0, conditions.beads * 2 * 3.14159265358979 * data.distance[i] * conditions.knot_px);
-    data.weight[i] = std::min(1.0, spacing / conditions.knot_px) /
-                     (conditions.noise * conditions.noise / pixels + learning * learning);
-  }
-  constexpr double likely_offset = 0.002;
-  data.offset_weight = 1 / (likely_offset * likely_offset);
-}
-
-// The profile in light, for a camera that encodes for display; none when light hardly differs inside and outside.
-std::optional<RimData> data_in_light(const RimData& recorded, const RimConditions& conditions) {
-  const double brightest = std::max({conditions.background_level, conditions.bead_level, 1.0});
-  const auto light = [&](double level) { return std::pow(std::max(0.0, level) / brightest, 1 / display_exponent); };
-  const double background = light(conditions.background_level), bead = light(conditions.bead_level);
-  if (!(std::abs(bead - background) > 0.05)) return std::nullopt;
-  RimData data = recorded;
-  for (double& level : data.level)
-    level = (light(conditions.background_level + (conditions.bead_level - conditions.background_level) * level) -
-             background) /
-            (bead - background);
-  return data;
-}
-
-struct RimTrial {
-  RimFit rim;
-  double terms = 0, exponent = 1;
-  bool odd = false;  // neither flat nor an evenly lit ball
-};
-
 void try_shadings(const RimData& levels, double exponent, const RimConditions& conditions,
                   std::vector<RimTrial>& trials) {
   constexpr std::array<RimTerms, 8> families = {
@@ -274,43 +220,6 @@ void try_shadings(const RimData& levels, double exponent, const RimConditions& c
     const auto terms = static_cast<double>(std::count(family.begin(), family.end(), true));
     trials.push_back({rim, terms, exponent, family[2] || family[3] || family[4]});
   }
-}
-
-// Reductions of chi^2 that are required to accept a term, an unusual shape, and a tone curve.
-constexpr double price_of_term = 6, price_of_oddity = 12, price_of_curve = 12;
-
-// Shapes and tone curves that do as well each have their say; in the error, odd ones as much as any other.
-// `scale` multiplies all variances, `points` is the number of independent points.
-RimChoice average(const std::vector<RimTrial>& trials, double scale, double points) {
-  const auto cost = [&](const RimTrial& trial) {
-    return trial.rim.squares / scale + price_of_term * trial.terms + (trial.odd ? price_of_oddity : 0) +
-           (trial.exponent != 1 ? price_of_curve : 0);
-  };
-  const RimTrial least = *std::min_element(trials.begin(), trials.end(),
-                                           [&](const RimTrial& a, const RimTrial& b) { return cost(a) < cost(b); });
-  RimChoice choice;
-  choice.rim = least.rim;
-  choice.exponent = least.exponent;
-  constexpr double fair = 5;  // chi^2 a point
-  choice.rim.good = least.rim.squares < fair * points;
-  double weights = 0, mean = 0;
-  for (const RimTrial& trial : trials) {
-    const double weight = std::exp(0.5 * std::max(-60.0, cost(least) - cost(trial)));
-    weights += weight;
-    mean += weight * trial.rim.radius_px;
-  }
-  mean /= weights;
-  double fair_weights = 0, square = 0;
-  for (const RimTrial& trial : trials) {
-    const double surplus = cost(trial) - cost(least) - (trial.odd && !least.odd ? price_of_oddity : 0) -
-                           (trial.exponent != 1 && least.exponent == 1 ? price_of_curve : 0);
-    const double weight = std::exp(-0.5 * std::clamp(surplus, 0.0, 60.0));
-    fair_weights += weight;
-    square += weight * (std::pow(trial.rim.radius_px - mean, 2) + scale * std::pow(trial.rim.std_error_px, 2));
-  }
-  choice.rim.radius_px = mean;
-  choice.rim.std_error_px = std::sqrt(square / fair_weights);
-  return choice;
 }
 
 // A flat disk on an even background, contrast and background free, by a search over radius and edge.
@@ -415,7 +324,7 @@ RimChoice choose_rim(const BeadProfile& profile, const RimConditions& conditions
   const double points = static_cast<double>(data.distance.size()) * std::min(1.0, spacing / conditions.knot_px);
   double least_squares = trials.front().rim.squares;
   for (const RimTrial& trial : trials) least_squares = std::min(least_squares, trial.rim.squares);
-  return average(trials, std::max(1.0, least_squares / std::max(1.0, points - 5)), points);
+  return choice_among(trials, std::max(1.0, least_squares / std::max(1.0, points - 5)), points);
 }
 
 ToneFit fit_tone_exponent(const BeadProfile& profile, double background_level, double bead_level,

@@ -5,8 +5,9 @@
 #include <utility>
 
 #include "ingest/calibrate/solid_borders.hpp"
-#include "ingest/find/candidates.hpp"
+#include "ingest/find/disk_pixels.hpp"
 #include "ingest/find/joint_fit.hpp"
+#include "ingest/find/laid_disks.hpp"
 #include "ingest/find/learned_beads.hpp"
 #include "ingest/find/nearby.hpp"
 #include "statistics/text.hpp"
@@ -15,9 +16,6 @@ namespace shakebed::ingest {
 
 namespace {
 
-// Shares of the sum of two radii, and score in the map: ideal disks are laid no nearer to one another, the best first.
-// Places in the map are good to a tenth of a radius.
-constexpr double least_laid_distance = 0.85, least_laid_score = 0.5;
 // From one radius tried to the next: learning finds a radius that is off by 10 %.
 constexpr double radius_step = 1.025, same_kind = 0.1;
 // Beyond the rim of a bead of the other kind its blurred edge is unseen, too [edge widths; px while only laid]. With
@@ -32,11 +30,6 @@ constexpr double like_a_bead = 0.5;  // contrast units
 // Drawn beds of ratios 1.25 to 2 in which all beads were found: 0 of both; with 5 % missed, up to 0.01 and 0.03.
 constexpr double most_left_unexplained = 0.1, most_undecided = 0.05;
 
-struct KnownPlace {
-  double x = 0, y = 0, radius = 0;
-};
-using KnownPlaces = std::vector<KnownPlace>;
-
 KnownPlaces places_of(const FindResult& found) {
   KnownPlaces places;
   for (const FoundDisk& disk : found.disks) places.push_back({disk.x_px, disk.y_px, disk.radius_px});
@@ -47,62 +40,6 @@ double margin_of(const FinderCalibration& large, const FinderCalibration& small)
   return margin_edges * std::max(large.edge_width_px, small.edge_width_px);
 }
 
-// visit(pixel) for the pixels of a frame nearer to a place than `reach`.
-template <class Visit>
-void for_pixels_around(const GrayFrame& frame, const KnownPlace& place, double reach, const Visit& visit) {
-  const int top = std::max(0, static_cast<int>(std::ceil(place.y - reach)));
-  const int bottom = std::min(frame.height - 1, static_cast<int>(std::floor(place.y + reach)));
-  for (int row = top; row <= bottom; ++row) {
-    const double half = std::sqrt(std::max(0.0, reach * reach - (row - place.y) * (row - place.y)));
-    const int left = std::max(0, static_cast<int>(std::ceil(place.x - half)));
-    const int right = std::min(frame.width - 1, static_cast<int>(std::floor(place.x + half)));
-    for (int column = left; column <= right; ++column)
-      visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(column),
-            column - place.x, row - place.y);
-  }
-}
-
-GrayFrame without_beads(GrayFrame frame, const KnownPlaces& places, double margin_px) {
-  for (const KnownPlace& place : places)
-    for_pixels_around(frame, place, place.radius + margin_px,
-                      [&](std::size_t pixel, double, double) { frame.pixels[pixel] = unseen_level; });
-  return frame;
-}
-
-// Ideal disks of both radii where the flattened frame looks like them.
-struct Laid {
-  KnownPlaces large, small;
-};
-Laid lay_disks(const GrayFrame& flat, double large_px, double small_px) {
-  struct Candidate {
-    KnownPlace place;
-    double score = 0;
-  };
-  std::vector<Candidate> candidates;
-  const double noise = noise_of(flat);
-  for (const double radius : {large_px, small_px})
-    for (const DiskCandidate& one : candidates_in(flat, radius, noise, least_laid_score))
-      candidates.push_back({{one.x, one.y, radius}, one.score});
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& one, const Candidate& other) { return one.score > other.score; });
-  const Nearby near(candidates.size(), 2 * large_px * least_laid_distance,
-                    [&](std::size_t i) { return std::pair(candidates[i].place.x, candidates[i].place.y); });
-  std::vector<char> dropped(candidates.size(), 0);
-  Laid laid;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (dropped[i]) continue;
-    const KnownPlace& one = candidates[i].place;
-    (one.radius == large_px ? laid.large : laid.small).push_back(one);
-    near.any_near(one.x, one.y, [&](std::size_t k) {
-      const KnownPlace& other = candidates[k].place;
-      if (k > i && std::hypot(other.x - one.x, other.y - one.y) < least_laid_distance * (one.radius + other.radius))
-        dropped[k] = 1;
-      return false;
-    });
-  }
-  return laid;
-}
-
 // The beads of one kind in a frame without the other, from where they are thought to be. A search would take what is
 // left of several beads between unseen ones for one bead.
 FindResult find_from(const KnownPlaces& start, const GrayFrame& rest, const FinderCalibration& finder,
@@ -110,34 +47,6 @@ FindResult find_from(const KnownPlaces& start, const GrayFrame& rest, const Find
   std::vector<DiskCandidate> places;
   for (const KnownPlace& place : start) places.push_back({place.x, place.y, 1});
   return find_disks_from(places, rest, finder, options);
-}
-
-// Mean square of what these disks leave of a flattened frame.
-double squares_left(const GrayFrame& flat, const Laid& laid) {
-  std::vector<float> model(flat.pixels.size(), 0.0F);
-  for (const KnownPlaces* places : {&laid.large, &laid.small})
-    for (const KnownPlace& place : *places)
-      for_pixels_around(flat, place, place.radius, [&](std::size_t pixel, double, double) { model[pixel] = 1; });
-  double squares = 0, count = 0;
-  for (std::size_t k = 0; k < model.size(); ++k) {
-    if (unseen(flat.pixels[k])) continue;
-    const double gap = static_cast<double>(std::clamp(flat.pixels[k], -0.6F, 1.6F) - model[k]);
-    squares += gap * gap;
-    ++count;
-  }
-  return squares / std::max(1.0, count);
-}
-
-// One camera recorded both kinds: what tone curve and blur add to the radius of the rims is the same, and the kind that
-// shows it better decides.
-void share_camera(FinderCalibration& large, FinderCalibration& small) {
-  const bool by_large = large.radius_std_error_px < small.radius_std_error_px;
-  const FinderCalibration& sure = by_large ? large : small;
-  FinderCalibration& other = by_large ? small : large;
-  other.radius_px = other.rim_radius_px + sure.radius_px - sure.rim_radius_px;
-  other.radius_std_error_px = sure.radius_std_error_px;
-  other.tone_exponent = sure.tone_exponent;
-  other.radius_of_all_rims = false;
 }
 
 // The kinds are learned in turns.
@@ -187,7 +96,7 @@ class KindsLearner {
       large_px_ = radius;
     }
     for (const GrayFrame& flat : flats) {
-      Laid laid = lay_disks(flat, large_px_, large_px_ / asked_.ratio);
+      LaidDisks laid = lay_disks(flat, large_px_, large_px_ / asked_.ratio);
       larges_.push_back(std::move(laid.large));
       smalls_.push_back(std::move(laid.small));
     }
@@ -247,7 +156,7 @@ class KindsFinder {
 
   KindsFound find() {
     const GrayFrame flat = flatten(open_, kinds_.large.light);
-    const Laid laid = lay_disks(flat, kinds_.large.rim_radius_px, kinds_.small.rim_radius_px);
+    const LaidDisks laid = lay_disks(flat, kinds_.large.rim_radius_px, kinds_.small.rim_radius_px);
     KnownPlaces smalls = laid.small;
     double margin = laid_margin_px;
     std::size_t undecided = 0;
@@ -287,7 +196,7 @@ class KindsFinder {
         return false;
       });
       double as_large = 0, as_small = 0, apart = 0;
-      for_pixels_around(flat, all[i], reach, [&](std::size_t pixel, double dx, double dy) {
+      for_pixels_within(flat, all[i].x, all[i].y, reach, [&](std::size_t pixel, double dx, double dy) {
         if (unseen(flat.pixels[pixel])) return;
         for (const KnownPlace& other : others) {
           const double x = all[i].x + dx - other.x, y = all[i].y + dy - other.y, far = other.radius + margin_px_;

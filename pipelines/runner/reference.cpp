@@ -108,8 +108,8 @@ std::string options_text(const StageRow& row) {
 
 // --- results
 
-std::string kind_text(const StatedResult& result) {
-  switch (result.kind) {
+std::string kind_text(ResultKind kind) {
+  switch (kind) {
     case ResultKind::quantity:
       return "quantity";
     case ResultKind::number:
@@ -141,8 +141,8 @@ std::string results_text(const StageRow& row) {
       "{}| pointer | meaning | unit | kind | given |\n|---|---|---|---|---|\n",
       row.result, energy_unit_note(results));
   for (const StatedResult& one : results.all())
-    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", one.pointer, cell(one.meaning), one.unit, kind_text(one),
-                        when_text(one.given));
+    text += fmt::format("| `{}` | {} | {} | {}{} | {} |\n", one.pointer, cell(one.meaning), one.unit,
+                        kind_text(one.kind), one.may_be_null ? " or null" : "", when_text(one.given));
   if (!results.tables().empty()) text += "\n## Tables\n";
   for (const StatedTable& table : results.tables()) {
     text += fmt::format("\n### {}\n{} ({}).\n\n| column | unit | meaning |\n|---|---|---|\n", table.file, table.meaning,

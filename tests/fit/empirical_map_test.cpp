@@ -69,6 +69,26 @@ TEST(EmpiricalMap, OfOneAxisIsExactForAPowerLaw) {
   }
 }
 
+// Five points on one axis, of a curve that bends: each from the four others by a line through ln T, which weighs them
+// by a Gaussian of half the distance of the farthest. The rms of what is left is the error.
+TEST(EmpiricalMap, HasTheErrorOfPointsThatAreLeftOut) {
+  const std::vector<double> place = {1, 1.4, 2.3, 3.1, 4}, log_t = {-1, -0.6, -0.1, 0.6, 0.7};
+  std::vector<MapPoint> points;
+  for (std::size_t k = 0; k < 5; ++k) points.push_back({{place[k]}, std::exp(log_t[k]), 0});
+  double squares = 0;
+  for (std::size_t left_out = 0; left_out < 5; ++left_out) {
+    double width = 0, w = 0, wx = 0, wxx = 0, wy = 0, wxy = 0;
+    for (const double one : place) width = std::max(width, 0.5 * std::abs(one - place[left_out]));
+    for (std::size_t k = 0; k < 5; ++k) {
+      if (k == left_out) continue;
+      const double x = place[k] - place[left_out], weight = std::exp(-0.5 * std::pow(x / width, 2));
+      w += weight, wx += weight * x, wxx += weight * x * x, wy += weight * log_t[k], wxy += weight * x * log_t[k];
+    }
+    squares += std::pow((wxx * wy - wx * wxy) / (w * wxx - wx * wx) - log_t[left_out], 2) / 5;
+  }
+  EXPECT_NEAR(EmpiricalMap({{"gamma", false}}, points).interpolation_error(), std::sqrt(squares), 1e-6);
+}
+
 TEST(EmpiricalMap, SaysWhereItExtrapolatesOrCannot) {
   const EmpiricalMap map = make_map(0.0);
   const double outside[] = {20.0, 0.7};

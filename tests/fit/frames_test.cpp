@@ -155,6 +155,21 @@ TEST(Frames, BootstrapScattersByTheCovarianceOfTheWindows) {
   EXPECT_GT(of_shift.high, result.shift.value);
 }
 
+// Of 20 resamples the percentiles at 2.5 and 97.5 % lie 0.475 of the way from the outermost to the next; both are moved
+// away from T by Student's factor, the same for both.
+TEST(Frames, BootstrapReadsItsPercentilesBetweenFewResamples) {
+  const BootstrapResult result =
+      bootstrap_fit(make_frames(300, 0.9, 0.05, 77), plain_options(), {.resamples = 20, .seed = 3});
+  ASSERT_EQ(result.status, FitStatus::ok) << result.message;
+  ASSERT_EQ(result.temperatures.size(), 20U);
+  const std::vector<double>& sorted = result.temperatures;
+  const double centre = result.temperature.value, apart = 2.3646 / 1.95996, low = 0.525 * sorted[0] + 0.475 * sorted[1],
+               high = 0.525 * sorted[19] + 0.475 * sorted[18];
+  const double width = high - low;
+  EXPECT_NEAR(result.temperature_interval.low, centre + apart * (low - centre), 1e-4 * width);
+  EXPECT_NEAR(result.temperature_interval.high, centre + apart * (high - centre), 1e-4 * width);
+}
+
 TEST(Frames, FullCovarianceOfFramesFits) {
   const FrameAverage average = average_frames(make_frames(1000, 0.0, 0.3, 6));
   const FitResult fit = fit_profile(average.profile, plain_options());

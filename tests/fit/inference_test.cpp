@@ -137,6 +137,42 @@ TEST(Posterior, SmallToolsDoWhatTheySay) {
   EXPECT_NEAR(correlation_of(2, rows)[1], 0.6, 0.04);
 }
 
+// Three numbers of twelve runs, each in units of its own scatter about its own mean; all correlations are less by what
+// their estimates scatter by over what they are, a share of the sums of squares.
+TEST(Correlation, IsShrunkByItsOwnUncertainty) {
+  constexpr std::size_t runs = 12, count = 3;
+  std::vector<double> rows;
+  for (std::size_t r = 0; r < runs; ++r) {
+    const double a = std::sin(1.7 * static_cast<double>(r)), b = std::cos(2.9 * static_cast<double>(r * r));
+    rows.insert(rows.end(), {5 + a, 0.01 * (0.5 * a + b) - 3, 40 * (b - 0.4 * a) + 900});
+  }
+  std::vector<std::vector<double>> units(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    double mean = 0, square = 0;
+    for (std::size_t r = 0; r < runs; ++r) mean += rows[r * count + i] / runs;
+    for (std::size_t r = 0; r < runs; ++r) square += std::pow(rows[r * count + i] - mean, 2) / runs;
+    for (std::size_t r = 0; r < runs; ++r) units[i].push_back((rows[r * count + i] - mean) / std::sqrt(square));
+  }
+  double noise = 0, signal = 0;
+  std::array<std::array<double, count>, count> plain{};
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = 0; k < count; ++k) {
+      double square = 0;
+      for (std::size_t r = 0; r < runs; ++r) {
+        plain[i][k] += units[i][r] * units[k][r] / runs;
+        square += std::pow(units[i][r] * units[k][r], 2) / runs;
+      }
+      if (i != k) noise += (square - plain[i][k] * plain[i][k]) / runs, signal += plain[i][k] * plain[i][k];
+    }
+  const double kept = 1 - noise / signal;
+  EXPECT_GT(kept, 0.2);
+  EXPECT_LT(kept, 0.95);
+  const std::vector<double> found = correlation_of(count, rows);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = 0; k < count; ++k)
+      EXPECT_NEAR(found[i * count + k], i == k ? 1 : kept * plain[i][k], 1e-9) << i << ' ' << k;
+}
+
 // 100 sets of parameters from the prior, each "measured" once and inferred from one set of 80 runs.
 // Numbers whose neighbours have the correlation 0.6.
 std::vector<double> correlated(std::size_t count, std::mt19937_64& generator) {

@@ -217,6 +217,35 @@ TEST(BedLight, IsRefinedByWhatTheModelMisses) {
   }
 }
 
+// Tiles all over a frame whose flattened levels are off by the fourth power of the place: twenty of them follow its
+// second order, sixty its fourth in a frame of 200 px or more.
+TEST(BedLight, IsRefinedToTheOrderThatItsTilesTell) {
+  const auto most_after = [](std::size_t count, int side) {
+    std::vector<TileSums> tiles;
+    for (std::size_t k = 0; k < count; ++k) {
+      TileSums tile;
+      tile.u = 2 * test::scattered(static_cast<int>(k), 3) - 1,
+      tile.v = 2 * test::scattered(7, static_cast<int>(k)) - 1;
+      tile.count = 1000, tile.model = 400, tile.model_model = 380;
+      const double off = 0.1 * std::pow(tile.u, 4);
+      tile.flat = tile.model + off * tile.count, tile.flat_model = tile.model_model + off * tile.model;
+      tiles.push_back(tile);
+    }
+    const auto hundred = [](double, double) { return 100.0; };
+    LightField light = light_by(side, side, hundred, hundred);
+    refine_light(light, tiles, side, side);
+    return static_cast<double>(*std::max_element(light.background.begin(), light.background.end())) - 100;
+  };
+  // At the outermost node the fourth power is 1, or 1.05^4 where that lies beyond the frame; the best parabola has
+  // less.
+  EXPECT_NEAR(most_after(60, 320), 10, 0.3);
+  EXPECT_LT(most_after(59, 320), 8.5);
+  EXPECT_GT(most_after(20, 320), 6);
+  EXPECT_LT(most_after(19, 320), 5) << "one level for all";
+  EXPECT_NEAR(most_after(60, 200), 10 * std::pow(1.05, 4), 0.3);
+  EXPECT_LT(most_after(60, 199), 9.5);
+}
+
 ModelDisk bead_at(double x, double y) {
   ModelDisk disk;
   disk.x = x, disk.y = y;

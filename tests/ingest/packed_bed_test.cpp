@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -165,6 +166,30 @@ TEST(PackedBed, OtherTilingsDoNotConvince) {
   }
   const GrayFrame disks = tiled(15, true, [](double u, double v) { return std::hypot(u, v) < 0.5; });
   EXPECT_TRUE(learn_packed_bed({&disks}, {}).faces.found);
+}
+
+// From 3 to 14 px: where a search is to begin, and what it ends with.
+TEST(PackedBed, IsLookedForWithBeadsFromThreeToFourteenPixels) {
+  const auto frame_of = [](double radius, int columns_seen, int rows_seen) {
+    SyntheticBed bed;
+    bed.left_wall_px = 4, bed.right_wall_px = columns_seen - 5, bed.floor_px = rows_seen - 4, bed.radius_px = radius;
+    bed.rows = static_cast<int>((rows_seen - 16) / (std::sqrt(3.0) * radius));
+    Camera camera;
+    camera.width = columns_seen, camera.height = rows_seen, camera.blur_px = 0.8, camera.read_noise = 3;
+    return render_frame(make_synthetic_bed(bed), camera);
+  };
+  const auto radius_found = [](const GrayFrame& frame, std::optional<double> start) {
+    const auto found = look_for_packed_bed(frame, {{Polarity::dark_beads, start}});
+    return found ? found->faces.calibration.radius_px : 0;
+  };
+  const GrayFrame small = frame_of(3.2, 70, 60), smaller = frame_of(2.8, 62, 54), large = frame_of(13.7, 190, 170),
+                  larger = frame_of(14.3, 200, 180);
+  EXPECT_NEAR(radius_found(small, 3.05), 3.2, 0.1);
+  EXPECT_EQ(radius_found(small, 2.95), 0);
+  EXPECT_EQ(radius_found(smaller, 3.0), 0);
+  EXPECT_NEAR(radius_found(large, 13.9), 13.7, 0.1);
+  EXPECT_EQ(radius_found(large, 14.1), 0);
+  EXPECT_EQ(radius_found(larger, 13.9), 0);
 }
 
 TEST(PackedBed, CirclesOfALatticeTouchAtHalfItsSpacing) {

@@ -228,6 +228,19 @@ TEST(RadiusVote, CountsAsItsRulesSay) {
   }
 }
 
+// Centres in the first and the last rows and columns that can have a peak, and one farther out.
+TEST(RadiusVote, CountsAlongTheBorders) {
+  Camera camera;
+  camera.width = 66, camera.height = 57;
+  camera.background_level = 140, camera.blur_px = 0.7, camera.read_noise = 1, camera.round_to_8_bits = false;
+  const std::vector<RenderedDisk> disks = {{20, 1, 5, 0, 0},  {48, 0, 5, 0, 0},  {1, 24, 5, 0, 0}, {64, 30, 5, 0, 0},
+                                           {17, 55, 5, 0, 0}, {44, 56, 5, 0, 0}, {33, 28, 5, 0, 0}};
+  const GrayFrame frame = render_frame(disks, camera);
+  expect_same_votes(frame, 1, 4, 6.5, "borders");
+  const auto all = vote_for_radii(frame, 1, {4, 6.5});
+  EXPECT_TRUE(std::any_of(all.begin(), all.end(), [](const RadiusCandidate& one) { return one.count >= 5; }));
+}
+
 // The spacing of nine circles is not known, that of ten is: rows of five, 14 px apart, or of four and five.
 TEST(RadiusVote, KnowsTheSpacingOfTenCircles) {
   for (const int count : {9, 10}) {

@@ -311,6 +311,12 @@ TEST(RimGaps, OfSeveralSizesAreAsTheirRulesSay) {
   expect_same_gaps(spread.frame, spread.model, spread.known, false, "a spread");
 }
 
+// Larger beads, each of its own size: those of one to 1.67 radii are taken together.
+TEST(RimGaps, OfASpreadAreAsTheirRulesSay) {
+  const MixedBed larger = mixed_bed({10.5}, 6, 0.3);
+  EXPECT_EQ(expect_same_gaps(larger.frame, larger.model, larger.known, false, "a spread"), 1U);
+}
+
 // A bead found inside one of another size, that is far better seen, gives its place to it.
 TEST(RimGaps, GiveThePlacesOfPoorCirclesToLargerBeads) {
   MixedBed bed = mixed_bed({11.5}, 6);

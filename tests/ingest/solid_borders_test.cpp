@@ -269,6 +269,17 @@ TEST(BordersByHand, AreSeenUpToSomeGrain) {
   }
 }
 
+// An even area along half of a side is one, along less it is none: of sixteen strips eight must end on one line.
+TEST(BordersByHand, ReachAlongHalfOfTheirSide) {
+  for (const int strips : {7, 8, 9}) {
+    const GrayFrame frame = test::frame_by(128, 96, [&](int column, int row) {
+      const bool floor = row >= 84 && column < 8 * strips;
+      return floor ? 50 : ((column / 4 + row / 4) % 2 == 0 ? 90 : 190) + 8 * test::scattered(column / 4, row / 4);
+    });
+    EXPECT_EQ(expect_same_borders(frame, std::to_string(strips)), strips < 8 ? 0U : 1U);
+  }
+}
+
 // The same picture turned by quarters has the same borders on the other sides.
 TEST(BordersByHand, TurnWithTheirPicture) {
   const GrayFrame frame = banded_frame({.floor = 10, .floor_slope = 0.05, .step = 7});

@@ -232,6 +232,23 @@ TEST_F(FitByHand, TakesItsFactsFromTheBed) {
   EXPECT_EQ(value(run("")["column_number"]), 9);
 }
 
+// Without a base the answer is that of a hexagonal bed; a base that is given is the answer's, too.
+TEST_F(FitByHand, AnswersForABedOnItsBase) {
+  const auto answer = [&](const std::string& base) {
+    return fit_.run(R"({ "sweep": false, "compare": false, "answer": true)" + base + " }")["answer"].dump();
+  };
+  std::string whole = smoothed + "height,number_density,std_error\n";  // of 9.6 rows: from the base to the tail
+  for (int i = 0; i < 100; ++i) {
+    const double z = 0.125 * i;
+    whole += number_text(z) + "," + number_text(z < 8 ? 1.1 : 1.1 * std::exp(-(z - 8) / 0.4)) + ",0.01\n";
+  }
+  add_bed("bed", whole, bed_json(0, [](BedDescription& bed) { bed.count = 93; }));
+  const std::string plain = answer("");
+  EXPECT_THAT(plain, HasSubstr("\"temperature\""));
+  EXPECT_EQ(answer(", \"base\": " + number_text(0.5 - std::sqrt(3) / 4)), plain);
+  EXPECT_NE(answer(", \"base\": 0.5"), plain);
+}
+
 TEST_F(FitByHand, TakesNoNumberOfDisksFromPhotographs) {
   fit_.add_input("film", *find_stage("extract"));
   write_text(fit_.file("profile.csv"), profile_at(0.12, "# kernel: gaussian:0.5\n# column_number: 9\n"));

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -269,12 +270,15 @@ TEST_F(InferenceByHand, SaysWhatAFurtherMeasurementWouldTell) {
   const double covariance = 0.4 * 20.2 + 0.3 * 25.2 - 0.7 * mean, both = covariance * covariance / (variance * 0.21);
   double last = 1;
   std::size_t rows = 0;
+  std::set<std::string> measured;  // of the parameters
   for (const Json& row : json_["narrowing"]) {
     EXPECT_LE(row["reduction"].get<double>(), last);
     last = row["reduction"], ++rows;
     if (row["measurement"] == "sides" || row["measurement"] == "frequency") {
       EXPECT_NEAR(row["reduction"].get<double>(), both, 1e-12);
       EXPECT_EQ(row["parameters"].size(), 1U);
+      EXPECT_TRUE(row["parameters"].contains(row["measurement"] == "sides" ? "frequency" : "sides")) << "the other";
+      measured.insert(row["measurement"].get<std::string>());
       EXPECT_EQ(row["meaning"], "the parameter itself; given is its effect on the other parameters");
     }
     if (row["measurement"] == "center_of_mass_rise") {  // a line of the frequency: 0.2 a Hz, scattered by 0.01
@@ -285,6 +289,7 @@ TEST_F(InferenceByHand, SaysWhatAFurtherMeasurementWouldTell) {
     }
   }
   EXPECT_EQ(rows, observables().size() + 2);
+  EXPECT_EQ(measured, (std::set<std::string>{"frequency", "sides"}));
   const Json& t = json_["surrogate"]["temperature_over_mg"];
   EXPECT_EQ(t["beds"], 40);
   EXPECT_EQ(t["scatter_is"], "relative");
