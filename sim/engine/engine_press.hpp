@@ -44,8 +44,8 @@ inline constexpr double chattering = 0.6, chattering_on = 0.04;
 inline constexpr double cold = 0.02, chattering_of_cold = 0.02;
 inline constexpr double landing_contact_time = 1e-3;  // of soft disks in flight; 17 us for 3 mm disks
 // How far beds move against the floor in a contact time [D], at most: they harden as soon as their springs hold
-// little. Rough beds of 24 to 45 rows that had softened while they lay there, and were shaken up again, were compressed
-// by up to 0.02 D, smooth ones of 40 to 60 rows by 0.012 D, and T_x was up to twice too large.
+// little. Rough beds of 24 to 45 rows that had softened while they lay there, and were shaken up again, were
+// compressed by up to 0.02 D. Smooth ones of 40 to 60 rows were compressed by 0.012 D. Those with e = 0.5 were too hot.
 inline constexpr double landing_travel = 2e-3;
 // What springs that are still compressed may gain thereby, a check: of disks in flight [m g D], each; of the kinetic
 // energy against the floor.

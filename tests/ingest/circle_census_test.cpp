@@ -34,7 +34,7 @@ struct CensusLevel {
     GrayFrame picture = cut_out(frame, part);
     if (twice) picture = doubled(picture), scale *= 0.5;
     shorter = std::min(picture.width, picture.height);
-    maps[0] = find_edges(picture);
+    maps[0] = find_edges(picture, 0, twice ? Pixels::doubled : Pixels::own);
     maps[1] = find_edges(stretched(picture, 1.8, 0), maps[0].threshold);
     maps[2] = find_edges(stretched(picture, 1.8, std::numbers::pi / 4), maps[0].threshold);
   }

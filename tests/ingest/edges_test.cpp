@@ -97,6 +97,18 @@ TEST(Edges, CountFromAThresholdOn) {
   EXPECT_GT(hidden.slope(hidden.at(96, 100)), 0);
 }
 
+// White noise of 10 levels, enlarged twice: its gradients are as small as is said, and the threshold is four of them.
+TEST(Edges, KnowTheNoiseOfADoubledPicture) {
+  RandomStream random(7);
+  const GrayFrame noise = doubled(frame_by(300, 200, [&](int, int) { return 100 + 10 * random.normal(); }));
+  const EdgeMap edges = find_edges(noise, 0, Pixels::doubled);
+  double square = 0;
+  for (const float x : edges.x) square += static_cast<double>(x * x) / static_cast<double>(edges.x.size());
+  EXPECT_NEAR(std::sqrt(square), 1.91, 0.04);
+  EXPECT_NEAR(edges.threshold, 4 * 1.91, 0.15);
+  EXPECT_LT(find_edges(noise).threshold, 0.5 * edges.threshold) << "taken for the picture's own pixels";
+}
+
 // A step of 100 in each of 16 directions: one pixel for each row or column it crosses, with the normal's direction.
 TEST(Edges, AreOnePixelThick) {
   for (int k = 0; k < 16; ++k) {
