@@ -32,9 +32,6 @@ constexpr double fewest_of_a_shade = 3, least_share_of_a_shade = 0.03;
 constexpr double smallest_other = 0.4, largest_other = 2.5;
 constexpr double same_size = 0.06;  // of the radius: drawn beds of one size differ by up to 0.03 between their shades
 constexpr std::size_t most_other_sizes = 2;
-// Radii from all beads: ground there lies open. And the contrast against it that beads darker than it have at least, or
-// brighter, where the beads found have 1 in the other direction.
-constexpr double open_radii = 0.5, least_beyond_ground = 0.2;
 // Of a rim, the share in which edges are met, at least; and of one that is worth a longer search, of which straight
 // edges make up an eighth each. And of the weakest edges, those that noise does not make.
 constexpr double least_rim = 0.5, faintest_rim = 0.35;
@@ -201,26 +198,6 @@ TwoShades shades_of(const GrayFrame& frame, double margin, Polarity polarity, co
   return out;
 }
 
-// Whether they are gaps between the beads found: darker than bright beads and what their blur lights, or brighter than
-// dark ones, but as the ground is that lies open.
-bool are_gaps(const GrayFrame& frame, double margin, const std::vector<FoundDisk>& found,
-              const std::vector<FoundDisk>& others) {
-  std::vector<FoundDisk> all = found;
-  all.insert(all.end(), others.begin(), others.end());
-  double radius = 1;
-  for (const FoundDisk& disk : all) radius = std::max(radius, disk.radius_px);
-  const std::vector<std::uint8_t> hidden = covered_by(frame, all, margin + open_radii * radius);
-  constexpr double middle = 0.5;
-  const LevelsBehind open(frame, hidden, cell_radii * radius, middle);
-  if (!open.known()) return false;
-  const auto step = [&](const std::vector<FoundDisk>& disks) {
-    return median_inside(frame, disks,
-                         [&](int column, int row) { return frame.at(column, row) - open.at(column, row); });
-  };
-  const double first = step(found);
-  return first == 0 || step(others) / first > -least_beyond_ground;
-}
-
 bool of_same_size(const FinderCalibration& other, const FinderCalibration& first) {
   return std::abs(other.radius_px / first.radius_px - 1) < same_size;
 }
@@ -284,7 +261,7 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   if (!enough(expected_of(more.disks), found.disks) || by_chance(more.disks)) return;
   // Marks on other ground, as letters beside the bed, are no beads of the bed.
   const auto [ratio, same_ground] = shades_of(frame, margin_of(calibration), find.polarity, found.disks, more.disks);
-  if (!same_ground || (ratio < 0 && are_gaps(frame, margin_of(calibration), found.disks, more.disks))) return;
+  if (!same_ground) return;
   calibration.warnings.push_back(formatted(
       "Beads of two shades were found. In the first frame %zu of %zu beads differ from the background by %.2f of what "
       "the others do%s.",
