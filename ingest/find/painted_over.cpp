@@ -16,7 +16,7 @@ namespace {
 
 // What is behind the beads: the level of this rank among the pixels that no bead found covers, the darkest being 0, in
 // cells so wide [radii]. Beads of the other shade, which are brighter or darker, may be most of these pixels.
-constexpr double rank_behind_bright = 0.15, rank_behind_dark = 0.85;
+constexpr double rank_behind_bright = 0.15, rank_behind_dark = 0.85, cell_radii = 4;
 constexpr std::size_t fewest_in_cell = 40, most_in_cell = 600;
 
 }  // namespace

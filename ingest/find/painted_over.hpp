@@ -1,5 +1,5 @@
-#pragma once
 // A frame with its beads painted over by what is behind them.
+#pragma once
 
 #include <cstddef>
 #include <cstdint>
@@ -11,9 +11,6 @@
 #include "ingest/frames/frames.hpp"
 
 namespace shakebed::ingest {
-
-// The side of a cell, in radii of the largest bead.
-inline constexpr double cell_radii = 4;
 
 // Levels behind beads: in each square cell of the frame, the quantile `rank` of the pixels that are seen and not
 // hidden. Between the middles of the cells they are linear. A cell with few such pixels has the mean of its neighbours'
