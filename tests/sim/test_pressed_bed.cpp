@@ -210,6 +210,23 @@ TEST(PressedBed, OfTheEngineKeepsTheLedgerAndItsOverlaps) {
   }
 }
 
+// Forty rows that have softened while they lay. Their springs would be compressed by more than 0.01 D, which stops a
+// run.
+TEST(PressedBed, LandsHarderThanItLay) {
+  Scene scene = pressed_scene(2, 15);
+  scene.disks.species = {{600, 1, 1}};
+  scene.disks.contact = scene.box.floor_surface = {0.6, 0, 0};
+  scene.box.sides = HardSides{{0.6, 0, 0}};
+  const auto bed = simulate(scene);
+  double deepest = 0;
+  for (int k = 1; k <= 1280; ++k) {
+    bed->advance_to(k / 64.0 * period);
+    deepest = std::max(deepest, bed->largest_overlap());
+  }
+  EXPECT_GT(deepest, 1e-4);  // it was pressed
+  EXPECT_LT(deepest, 0.6 * soft_overlap);
+}
+
 TEST(PressedBed, DoesNotCareWhoLooksNorWhen) {
   for (const double gamma : {0.8, 1.2, 1.6}) {
     const Scene scene = pressed_scene(gamma);
