@@ -97,6 +97,26 @@ TEST(Edges, CountFromAThresholdOn) {
   EXPECT_GT(hidden.slope(hidden.at(96, 100)), 0);
 }
 
+// Column and row of each pixel decide alone, at the borders of the frame, too.
+TEST(Edges, AreNotSoughtFarFromARegion) {
+  const GrayFrame frame = frame_by(9, 8, [](int column, int row) { return 10 * row + column; });
+  for (const auto& [region, margin] :
+       {std::pair(PixelRectangle{3, 2, 3, 4}, 0.0), std::pair(PixelRectangle{3, 2, 3, 4}, 1.2),
+        std::pair(PixelRectangle{-2, 6, 4, 9}, 1.0)}) {
+    const int more = margin > 0 ? static_cast<int>(std::ceil(margin)) : 0;
+    const GrayFrame seen = seen_inside(frame, region, margin);
+    for (int row = 0; row < 8; ++row)
+      for (int column = 0; column < 9; ++column) {
+        const bool inside = column >= region.left - more && column < region.left + region.width + more &&
+                            row >= region.top - more && row < region.top + region.height + more;
+        EXPECT_EQ(unseen(seen.at(column, row)), !inside) << column << ", " << row;
+        if (inside) {
+          EXPECT_EQ(seen.at(column, row), frame.at(column, row));
+        }
+      }
+  }
+}
+
 // White noise of 10 levels, enlarged twice: its gradients are as small as is said, and the threshold is four of them.
 TEST(Edges, KnowTheNoiseOfADoubledPicture) {
   RandomStream random(7);
