@@ -20,9 +20,10 @@ template <class Rule>
 inline constexpr double longest_contact_time = Rule::spins ? 0.007 : 0.006;
 // Smooth disks are not pressed with shorter ones: 10 us for 2 mm disks.
 inline constexpr double shortest_contact_time = 7e-4;
-// How far disks approach in a contact time [D], while it is between the two. First: of beds that are taken for pressed
-// while they lie. Second: of others, and of hot ones later. Third: of cold ones later.
-inline constexpr double landing_approach = 0.7e-4, pressed_travel = 1e-4, travel_of_cold = 3e-4;
+// How far disks approach in a contact time [D], while it is between the two; cold smooth disks once they are pressed.
+template <class Rule>
+inline constexpr double pressed_travel = Rule::spins ? 1e-4 : 0.7e-4;
+inline constexpr double travel_of_cold = 3e-4;
 // How far rough disks move against the floor in a contact time [D].
 inline constexpr double pressed_drift = 3e-4;
 // Quicker contacts are left to events, unless rows have locked; so they are in a bed's first period, a packing that the
@@ -50,9 +51,10 @@ inline constexpr double landing_travel = 2e-3;
 // What springs that are still compressed may gain thereby, a check: of disks in flight [m g D], each; of the kinetic
 // energy against the floor.
 inline constexpr double gained_by_hardening = 1e-6, gained_of_motion = 1e-3;
-// Of the contact time at most, between two checks. A part of what the springs hold is lost thereby: with 1.05 rough
-// beds at Gamma = 1.2 have a fifth of the T_z of soft spheres.
-inline constexpr double softening = 1.05, softening_of_rough = 1.005;
+// Of the contact time at most, between two checks. A part of what the springs hold is lost thereby. With 1.05 in place
+// of 1.01 smooth beds at Gamma = 1.5 are a tenth too cold; in place of 1.005 rough ones at Gamma = 1.2 have a fifth of
+// the T_z of soft spheres. Smooth ones that are very cold, by T_x [m g D], hold nothing that counts.
+inline constexpr double softening = 1.01, softening_of_rough = 1.005, softening_of_very_cold = 1.05, very_cold = 0.003;
 inline constexpr double least_neighbours = 1;   // pairs a disk; rows on rows have three
 inline constexpr double neighbour_gap = 0.01;   // between two that are counted as such [D]
 inline constexpr double least_on_floor = 0.25;  // contacts with the floor meanwhile, a diameter of width
@@ -139,8 +141,7 @@ void Engine<Space, Rule, Sizes>::ask_press() {
   if (!crowded(longest_contact_time<Rule>, lies ? pressed_crowd : locked_crowd)) return;
   const std::optional<double> approach = approach_of_neighbours();
   if (!approach) return;
-  const double travel = lies && !Rule::spins ? landing_approach : pressed_travel;
-  double contact_time = std::min(longest_contact_time<Rule>, travel / *approach);
+  double contact_time = std::min(longest_contact_time<Rule>, pressed_travel<Rule> / *approach);
   if (!lies && !Rule::spins) contact_time = std::max(contact_time, shortest_contact_time);
   if (contact_time < (time() < interval_ ? least_contact_time_at_start : least_contact_time_of_locked)) return;
   if (!crowded(contact_time, lies && contact_time >= least_contact_time ? pressed_crowd : locked_crowd)) return;
@@ -256,7 +257,8 @@ void Engine<Space, Rule, Sizes>::end_press() {
 template <class Space, class Rule, class Sizes>
 void Engine<Space, Rule, Sizes>::soften_pressed() {
   const double approach = pressed_.approach();
-  const double travel = !Rule::spins && pressed_.side_temperature() < cold ? travel_of_cold : pressed_travel;
+  const double temperature = pressed_.side_temperature();
+  const double travel = !Rule::spins && temperature < cold ? travel_of_cold : pressed_travel<Rule>;
   double contact_time = longest_contact_time<Rule>;
   if (approach * contact_time > travel) contact_time = travel / approach;
   if constexpr (Rule::spins) {
@@ -264,7 +266,8 @@ void Engine<Space, Rule, Sizes>::soften_pressed() {
     if (speed * contact_time > pressed_drift) contact_time = pressed_drift / speed;
   }
   if (contact_time <= press_contact_time_) return;
-  press_contact_time_ = std::min(contact_time, (lands_soft() ? softening_of_rough : softening) * press_contact_time_);
+  const double most = lands_soft() ? softening_of_rough : temperature < very_cold ? softening_of_very_cold : softening;
+  press_contact_time_ = std::min(contact_time, most * press_contact_time_);
   pressed_.soften(press_contact_time_);
 }
 
