@@ -98,6 +98,26 @@ TEST(PressedRows, HaveEveryTwoThatAreNearInOneLane) {
   }
 }
 
+// Of boxes that hold one to three columns of disks, and of fewer disks than lanes.
+TEST(PressedRows, OfNarrowBoxesAndFewDisksAreComplete) {
+  std::vector<Packing> packings{random_packing(1, 0), random_packing(2.2, 0)};
+  for (const double width : {2.4, 3.0, 3.4, 4.7}) packings.push_back(random_packing(width, width));
+  for (std::size_t few = 1; few <= 6; ++few) {
+    Packing packing = hexagonal(2, 3, 0.02);
+    packing.x.resize(few), packing.z.resize(few);
+    packings.push_back(packing);
+  }
+  for (const Packing& packing : packings) {
+    SCOPED_TRACE(testing::Message() << packing.width << " " << packing.x.size());
+    PressedRows rows;
+    const auto count = static_cast<std::uint32_t>(packing.x.size());
+    rows.find(packing.x, packing.z, count, packing.width, packing.period, neighbour_reach);
+    ASSERT_EQ(rows.order().size(), count);
+    const Pairs near = all_near(packing), listed = pairs_of(rows);
+    EXPECT_TRUE(std::includes(listed.begin(), listed.end(), near.begin(), near.end()));
+  }
+}
+
 TEST(PressedRows, BeginWithThePairsSideBySide) {
   const Packing packing = hexagonal(9, 12, 0.02);
   PressedRows rows;
