@@ -10,6 +10,7 @@
 #include <string>
 #include <tuple>
 
+#include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 #include "fit/theory/expansion.hpp"
@@ -229,6 +230,51 @@ TEST(Answer, WidensItsIntervalWhereTheErrorsComeFromFewSamples) {
   // Student's t of 4 degrees of freedom, were all of it statistical; 1.96, were nothing.
   EXPECT_GT(factor, 2.3);
   EXPECT_LT(factor, 2.777);
+  // What another bed would give scatters by the statistical part alone, whose degrees are 4.
+  EXPECT_NEAR(std::log(few.next_bed_interval.high / few.temperature) * few.temperature / few.statistical_error,
+              2.776445, 1e-5);
+  EXPECT_NEAR(few.next_bed_interval.high * few.next_bed_interval.low, few.temperature * few.temperature, 1e-9);
+  // One sample more: of 5 degrees.
+  input.profile.covariance_samples = 6;
+  const Answer more = find_answer(input);
+  EXPECT_NEAR(std::log(more.next_bed_interval.high / more.temperature) * more.temperature / more.statistical_error,
+              2.570582, 1e-5);
+}
+
+// Welch's degrees of freedom: those of the statistical part over its fourth power.
+TEST(Answer, HasStudentsIntervalOfAPartOfItsUncertainty) {
+  AnswerInput input = column(1.0, 0.02);
+  const std::size_t n = input.profile.height.size();
+  input.profile.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i)
+    input.profile.covariance[i * n + i] = input.profile.std_error[i] * input.profile.std_error[i];
+  input.profile.covariance_samples = 5;
+  const Answer few = find_answer(input);
+  ASSERT_TRUE(few.ok());
+  const double part = std::hypot(few.statistical_error, few.misfit_error) / few.std_error;
+  ASSERT_LT(part, 0.95);
+  ASSERT_GT(part, 0.5);
+  EXPECT_NEAR(std::log(few.interval.high / few.temperature) * few.temperature / few.std_error,
+              student_quantile(0.975, 4 / std::pow(part, 4)), 1e-9);
+}
+
+// A kinetic temperature beyond an interval that is too wide widens it further, on its side, and there is no confidence
+// then.
+TEST(Answer, WidensAnOpenIntervalToItsKineticTemperatures) {
+  AnswerInput input = column(0.04);
+  input.temperature_x = input.temperature_z = Estimate{0.04, 0.04, false};
+  const Answer inside = find_answer(input);
+  ASSERT_TRUE(inside.ok()) << inside.why;
+  ASSERT_GT(inside.interval.high, 2 * inside.interval.low) << "else this tests nothing";
+  EXPECT_EQ(inside.interval.confidence, 0.95);
+  for (const double beyond : {0.97 * inside.interval.low, 1.03 * inside.interval.high}) {
+    input.temperature_x = input.temperature_z = Estimate{beyond, beyond, false};
+    const Answer both = find_answer(input);
+    EXPECT_EQ(both.interval.low, std::min(beyond, inside.interval.low));
+    EXPECT_EQ(both.interval.high, std::max(beyond, inside.interval.high));
+    EXPECT_EQ(both.interval.confidence, 0.0);
+    EXPECT_EQ(both.temperature, inside.temperature);
+  }
 }
 
 TEST(Answer, IsARangeWhereTheVelocitiesHaveTwoTemperatures) {
@@ -444,6 +490,35 @@ TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
   const double variance = 0.01 * 0.1 / (2.0 * std::sqrt(3.14159265358979) * 0.5);
   EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(variance), 1.0, 1e-3);
   EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 107] / variance, std::exp(-0.49), 1e-3);
+}
+
+// What a kernel lacks of the variance 0.25 D^2 is blurred into the profile, whatever its form; and what it leaves of a
+// crystal's rows is its Fourier transform at their distance. Both are integrals over the kernel, summed here.
+TEST(RowBlur, GoesByTheMomentsOfTheKernel) {
+  Profile profile;
+  for (int i = 0; i < 200; ++i) {
+    profile.height.push_back(0.05 + 0.1 * i);
+    profile.number_density.push_back(0.7);
+    profile.std_error.push_back(0.1);
+  }
+  Profile bare = profile;  // without errors it is left as it is
+  bare.std_error.clear();
+  for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.2}, Kernel{KernelKind::top_hat, 1.0},
+                               Kernel{KernelKind::disk_chord, 1.0}, Kernel{KernelKind::disk_chord, 0.4}}) {
+    double variance = 0, wave = 0;
+    constexpr int steps = 200'000;
+    for (int i = 0; i < steps; ++i) {
+      const double x = 1.5 * (2 * (i + 0.5) / steps - 1), weight = kernel_density(kernel, x) * 3 / steps;
+      variance += weight * x * x;
+      wave += weight * std::cos(2 * std::numbers::pi * x / (std::numbers::sqrt3 / 2));
+    }
+    EXPECT_NEAR(blur_rows(bare, kernel, 0.0).rows_seen, std::abs(wave), 1e-4) << to_string(kernel.kind);
+    const BlurredProfile blurred = blur_rows(profile, kernel, 0.0);
+    EXPECT_EQ(blurred.kernel.width, 0.5);
+    const double by = std::sqrt(0.25 - variance), of_noise = 0.01 * 0.1 / (2 * std::sqrt(std::numbers::pi) * by);
+    EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(of_noise), 1, 1e-3) << to_string(kernel.kind);
+    EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 105] / of_noise, std::exp(-0.25 / (4 * by * by)), 1e-3);
+  }
 }
 
 TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
