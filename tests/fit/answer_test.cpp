@@ -115,6 +115,34 @@ TEST(Answer, TakesInHowFarItsThermometersDiffer) {
   EXPECT_GT(largest, 0.5);
 }
 
+// What the model is known to miss beyond 0.005 per D^2 stands in every density's error, less of it where the window
+// holds less than 0.5 per D^2. Hot beds' models miss no more than that.
+TEST(Answer, TakesInWhatItsModelIsKnownToMiss) {
+  const auto added = [](const AnswerInput& input) {
+    const Answer answer = find_answer(input);
+    EXPECT_TRUE(answer.ok()) << answer.why;
+    return answer.readings.front().model_error;
+  };
+  EXPECT_NEAR(added(column(1.0, 0.001)), known_misfit(1.0) - 0.005, 1e-4);
+  EXPECT_NEAR(added(column(0.5, 0.001)), known_misfit(0.5) - 0.005, 1e-4);
+  EXPECT_EQ(added(column(5.0, 0.001)), 0.0);
+  // A gas, in whose window 0.3 per D^2 is the most.
+  const auto truth = HydrostaticProfile::of_column(best_of(), 0.6, {0.4, close_packing_density});
+  AnswerInput thin;
+  thin.kernel = usual_kernel;
+  thin.base = 0.0;
+  const double top = synthetic::top_of(truth);
+  thin.profile = synthetic::profile_of(truth, usual_kernel, static_cast<int>(4 * top), top, 0.0001, 11);
+  double most = 0;
+  const Answer answer = find_answer(thin);
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  for (std::size_t i = 0; i < thin.profile.height.size(); ++i)
+    if (thin.profile.height[i] >= answer.readings.front().window_low)
+      most = std::max(most, thin.profile.number_density[i]);
+  ASSERT_LT(most, 0.4);
+  EXPECT_NEAR(added(thin), std::pow(most / 0.5, 2) * (known_misfit(0.6) - 0.005), 2e-4);
+}
+
 // The known misfit is of beds that are dense at the floor. A model of a thin gas misses its densities by as much less,
 // so the statistics decide.
 TEST(Answer, OfAThinGasIsAsCertainAsItsStatistics) {
