@@ -155,6 +155,28 @@ TEST(PressedRows, FollowARowAroundPeriodicSides) {
   }
 }
 
+// Every second disk lies a little higher. Right of the lower row's last lie two: one 19 degrees up, one 24 degrees
+// down.
+TEST(PressedRows, FollowTheMostLevelNeighbour) {
+  Packing packing{10, 0, {}, {}};
+  for (int r = 0; r < 2; ++r)
+    for (int i = 0; i < 8; ++i) {
+      packing.x.push_back(0.5 + i + 0.5 * r);
+      packing.z.push_back(0.5 + 0.87 * r + (i % 2 == 0 ? 0 : 0.04));
+    }
+  packing.x.insert(packing.x.end(), {8.5, 8.4});
+  packing.z.insert(packing.z.end(), {0.88, 0.14});
+  const std::vector<std::uint32_t> expected{17, 0, 1, 2, 3, 4, 5, 6, 7, 16, 8, 9, 10, 11, 12, 13, 14, 15};
+  PressedRows rows;
+  rows.find(packing.x, packing.z, 18, packing.width, 0, neighbour_reach);
+  EXPECT_EQ(rows.order(), expected);
+  // The same row from the other side: what is most level to the left.
+  for (double& x : packing.x) x = 10 - x;
+  rows.find(packing.x, packing.z, 18, packing.width, 0, neighbour_reach);
+  const std::vector<std::uint32_t> mirrored{17, 16, 7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8};
+  EXPECT_EQ(rows.order(), mirrored);
+}
+
 // The same disks in another order are the same rows.
 TEST(PressedRows, DoNotDependOnTheOrderOfTheDisks) {
   const Packing packing = hexagonal(7, 9, 0.05);
