@@ -11,27 +11,14 @@
 #include <tuple>
 
 #include "fit/profile_fit/chances.hpp"
-#include "fit/profile_fit/row_blur.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 #include "fit/theory/expansion.hpp"
+#include "tests/fit/answer_column.hpp"
 #include "tests/fit/simulated_bed.hpp"
 #include "tests/fit/synthetic.hpp"
 
 namespace shakebed::fit {
 namespace {
-
-const Kernel usual_kernel{KernelKind::gaussian, 0.5};
-
-// A column of the accurate equation of state, of 20 D, with noise: what a bed would be without layers.
-AnswerInput column(double temperature, double noise = 0.003, std::uint64_t seed = 5) {
-  const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {20.0, close_packing_density});
-  AnswerInput input;
-  input.kernel = usual_kernel;
-  input.base = 0.0;
-  const int bins = static_cast<int>(4.0 * synthetic::top_of(truth));
-  input.profile = synthetic::profile_of(truth, usual_kernel, bins, synthetic::top_of(truth), noise, seed);
-  return input;
-}
 
 TEST(Answer, OfABedInEquilibriumIsItsTemperature) {
   // Simulated, 6 T_c and 20 T_c; a bath holds T.
@@ -113,34 +100,6 @@ TEST(Answer, TakesInHowFarItsThermometersDiffer) {
     largest = std::max(largest, answer.spread / answer.std_error);
   }
   EXPECT_GT(largest, 0.5);
-}
-
-// What the model is known to miss beyond 0.005 per D^2 stands in every density's error, less of it where the window
-// holds less than 0.5 per D^2. Hot beds' models miss no more than that.
-TEST(Answer, TakesInWhatItsModelIsKnownToMiss) {
-  const auto added = [](const AnswerInput& input) {
-    const Answer answer = find_answer(input);
-    EXPECT_TRUE(answer.ok()) << answer.why;
-    return answer.readings.front().model_error;
-  };
-  EXPECT_NEAR(added(column(1.0, 0.001)), known_misfit(1.0) - 0.005, 1e-4);
-  EXPECT_NEAR(added(column(0.5, 0.001)), known_misfit(0.5) - 0.005, 1e-4);
-  EXPECT_EQ(added(column(5.0, 0.001)), 0.0);
-  // A gas, in whose window 0.3 per D^2 is the most.
-  const auto truth = HydrostaticProfile::of_column(best_of(), 0.6, {0.4, close_packing_density});
-  AnswerInput thin;
-  thin.kernel = usual_kernel;
-  thin.base = 0.0;
-  const double top = synthetic::top_of(truth);
-  thin.profile = synthetic::profile_of(truth, usual_kernel, static_cast<int>(4 * top), top, 0.0001, 11);
-  double most = 0;
-  const Answer answer = find_answer(thin);
-  ASSERT_TRUE(answer.ok()) << answer.why;
-  for (std::size_t i = 0; i < thin.profile.height.size(); ++i)
-    if (thin.profile.height[i] >= answer.readings.front().window_low)
-      most = std::max(most, thin.profile.number_density[i]);
-  ASSERT_LT(most, 0.4);
-  EXPECT_NEAR(added(thin), std::pow(most / 0.5, 2) * (known_misfit(0.6) - 0.005), 2e-4);
 }
 
 // The known misfit is of beds that are dense at the floor. A model of a thin gas misses its densities by as much less,
@@ -267,42 +226,6 @@ TEST(Answer, WidensItsIntervalWhereTheErrorsComeFromFewSamples) {
   const Answer more = find_answer(input);
   EXPECT_NEAR(std::log(more.next_bed_interval.high / more.temperature) * more.temperature / more.statistical_error,
               2.570582, 1e-5);
-}
-
-// Welch's degrees of freedom: those of the statistical part over its fourth power.
-TEST(Answer, HasStudentsIntervalOfAPartOfItsUncertainty) {
-  AnswerInput input = column(1.0, 0.02);
-  const std::size_t n = input.profile.height.size();
-  input.profile.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i)
-    input.profile.covariance[i * n + i] = input.profile.std_error[i] * input.profile.std_error[i];
-  input.profile.covariance_samples = 5;
-  const Answer few = find_answer(input);
-  ASSERT_TRUE(few.ok());
-  const double part = std::hypot(few.statistical_error, few.misfit_error) / few.std_error;
-  ASSERT_LT(part, 0.95);
-  ASSERT_GT(part, 0.5);
-  EXPECT_NEAR(std::log(few.interval.high / few.temperature) * few.temperature / few.std_error,
-              student_quantile(0.975, 4 / std::pow(part, 4)), 1e-9);
-}
-
-// A kinetic temperature beyond an interval that is too wide widens it further, on its side, and there is no confidence
-// then.
-TEST(Answer, WidensAnOpenIntervalToItsKineticTemperatures) {
-  AnswerInput input = column(0.04);
-  input.temperature_x = input.temperature_z = Estimate{0.04, 0.04, false};
-  const Answer inside = find_answer(input);
-  ASSERT_TRUE(inside.ok()) << inside.why;
-  ASSERT_GT(inside.interval.high, 2 * inside.interval.low) << "else this tests nothing";
-  EXPECT_EQ(inside.interval.confidence, 0.95);
-  for (const double beyond : {0.97 * inside.interval.low, 1.03 * inside.interval.high}) {
-    input.temperature_x = input.temperature_z = Estimate{beyond, beyond, false};
-    const Answer both = find_answer(input);
-    EXPECT_EQ(both.interval.low, std::min(beyond, inside.interval.low));
-    EXPECT_EQ(both.interval.high, std::max(beyond, inside.interval.high));
-    EXPECT_EQ(both.interval.confidence, 0.0);
-    EXPECT_EQ(both.temperature, inside.temperature);
-  }
 }
 
 TEST(Answer, IsARangeWhereTheVelocitiesHaveTwoTemperatures) {
@@ -497,86 +420,6 @@ TEST(Answer, IsNotMisledByTheRowsOfACrystal) {
   EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
   EXPECT_NEAR(answer.temperature, 0.3, 0.01);
   EXPECT_LT(answer.std_error, 0.01);
-}
-
-TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
-  // White noise of 0.1 every 0.1 D on a flat density of 0.7, at points. Blurred by 0.5 D its variance is that times
-  // 0.1/(2 sqrt(pi) 0.5), and neighbours d apart are correlated by exp(-d^2/(4 0.25)).
-  Profile profile;
-  for (int i = 0; i < 200; ++i) {
-    profile.height.push_back(0.05 + 0.1 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
-  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
-  EXPECT_EQ(blurred.kernel.kind, KernelKind::gaussian);
-  EXPECT_EQ(blurred.kernel.width, 0.5);
-  EXPECT_NEAR(blurred.rows_seen, std::exp(-2.0 * std::pow(3.14159265358979 * 0.5 / 0.8660254, 2)), 1e-6);
-  ASSERT_EQ(blurred.profile.height.size(), 200U);
-  EXPECT_NEAR(blurred.profile.number_density[100], 0.7, 1e-4);
-  EXPECT_NEAR(blurred.profile.number_density[0], 0.7 * kernel_cumulative({KernelKind::gaussian, 0.5}, 0.05), 1e-2);
-  const double variance = 0.01 * 0.1 / (2.0 * std::sqrt(3.14159265358979) * 0.5);
-  EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(variance), 1.0, 1e-3);
-  EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 107] / variance, std::exp(-0.49), 1e-3);
-}
-
-// What a kernel lacks of the variance 0.25 D^2 is blurred into the profile, whatever its form; and what it leaves of a
-// crystal's rows is its Fourier transform at their distance. Both are integrals over the kernel, summed here.
-TEST(RowBlur, GoesByTheMomentsOfTheKernel) {
-  Profile profile;
-  for (int i = 0; i < 200; ++i) {
-    profile.height.push_back(0.05 + 0.1 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
-  Profile bare = profile;  // without errors it is left as it is
-  bare.std_error.clear();
-  for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.2}, Kernel{KernelKind::top_hat, 1.0},
-                               Kernel{KernelKind::disk_chord, 1.0}, Kernel{KernelKind::disk_chord, 0.4}}) {
-    double variance = 0, wave = 0;
-    constexpr int steps = 200'000;
-    for (int i = 0; i < steps; ++i) {
-      const double x = 1.5 * (2 * (i + 0.5) / steps - 1), weight = kernel_density(kernel, x) * 3 / steps;
-      variance += weight * x * x;
-      wave += weight * std::cos(2 * std::numbers::pi * x / (std::numbers::sqrt3 / 2));
-    }
-    EXPECT_NEAR(blur_rows(bare, kernel, 0.0).rows_seen, std::abs(wave), 1e-4) << to_string(kernel.kind);
-    const BlurredProfile blurred = blur_rows(profile, kernel, 0.0);
-    EXPECT_EQ(blurred.kernel.width, 0.5);
-    const double by = std::sqrt(0.25 - variance), of_noise = 0.01 * 0.1 / (2 * std::sqrt(std::numbers::pi) * by);
-    EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(of_noise), 1, 1e-3) << to_string(kernel.kind);
-    EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 105] / of_noise, std::exp(-0.25 / (4 * by * by)), 1e-3);
-  }
-}
-
-TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
-  Profile profile;
-  for (int i = 0; i < 50; ++i) {
-    profile.height.push_back(0.25 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
-  const Kernel wide{KernelKind::gaussian, 0.5};
-  EXPECT_EQ(blur_rows(profile, wide, 0.0).profile.number_density, profile.number_density);
-  EXPECT_EQ(blur_rows(profile, wide, 0.0).kernel.width, 0.5);
-  Profile coarse = profile;  // heights 1 D apart cannot be blurred by 0.5 D
-  for (double& height : coarse.height) height *= 4.0;
-  EXPECT_EQ(blur_rows(coarse, {}, 0.0).kernel.kind, KernelKind::none);
-  EXPECT_EQ(blur_rows(coarse, {}, 0.0).rows_seen, 1.0);
-  Profile two = profile;  // no rows to speak of
-  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error}) values->resize(2);
-  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::none);
-  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error})
-    values->push_back(values == &two.height ? 0.5 : values->back());
-  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::gaussian) << "three";
-  Profile bare = profile;
-  bare.std_error.clear();
-  EXPECT_EQ(blur_rows(bare, {}, 0.0).profile.number_density, bare.number_density);
-  Profile broken = profile;  // to be refused with its place, not blurred
-  broken.std_error[3] = -0.1;
-  EXPECT_EQ(blur_rows(broken, {}, 0.0).profile.std_error, broken.std_error);
-  // A profile that begins in the middle of a bed loses the heights that lack what lies below.
-  EXPECT_NEAR(blur_rows(profile, {}, -5.0).profile.height.front(), 2.0, 1e-12);
 }
 
 TEST(Answer, FindsTheSolidOfAColdBed) {
