@@ -10,27 +10,15 @@
 #include <string>
 #include <tuple>
 
-#include "fit/profile_fit/row_blur.hpp"
+#include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 #include "fit/theory/expansion.hpp"
+#include "tests/fit/answer_column.hpp"
 #include "tests/fit/simulated_bed.hpp"
 #include "tests/fit/synthetic.hpp"
 
 namespace shakebed::fit {
 namespace {
-
-const Kernel usual_kernel{KernelKind::gaussian, 0.5};
-
-// A column of the accurate equation of state, of 20 D, with noise: what a bed would be without layers.
-AnswerInput column(double temperature, double noise = 0.003, std::uint64_t seed = 5) {
-  const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {20.0, close_packing_density});
-  AnswerInput input;
-  input.kernel = usual_kernel;
-  input.base = 0.0;
-  const int bins = static_cast<int>(4.0 * synthetic::top_of(truth));
-  input.profile = synthetic::profile_of(truth, usual_kernel, bins, synthetic::top_of(truth), noise, seed);
-  return input;
-}
 
 TEST(Answer, OfABedInEquilibriumIsItsTemperature) {
   // Simulated, 6 T_c and 20 T_c; a bath holds T.
@@ -229,6 +217,15 @@ TEST(Answer, WidensItsIntervalWhereTheErrorsComeFromFewSamples) {
   // Student's t of 4 degrees of freedom, were all of it statistical; 1.96, were nothing.
   EXPECT_GT(factor, 2.3);
   EXPECT_LT(factor, 2.777);
+  // What another bed would give scatters by the statistical part alone, whose degrees are 4.
+  EXPECT_NEAR(std::log(few.next_bed_interval.high / few.temperature) * few.temperature / few.statistical_error,
+              2.776445, 1e-5);
+  EXPECT_NEAR(few.next_bed_interval.high * few.next_bed_interval.low, few.temperature * few.temperature, 1e-9);
+  // One sample more: of 5 degrees.
+  input.profile.covariance_samples = 6;
+  const Answer more = find_answer(input);
+  EXPECT_NEAR(std::log(more.next_bed_interval.high / more.temperature) * more.temperature / more.statistical_error,
+              2.570582, 1e-5);
 }
 
 TEST(Answer, IsARangeWhereTheVelocitiesHaveTwoTemperatures) {
@@ -423,57 +420,6 @@ TEST(Answer, IsNotMisledByTheRowsOfACrystal) {
   EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
   EXPECT_NEAR(answer.temperature, 0.3, 0.01);
   EXPECT_LT(answer.std_error, 0.01);
-}
-
-TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
-  // White noise of 0.1 every 0.1 D on a flat density of 0.7, at points. Blurred by 0.5 D its variance is that times
-  // 0.1/(2 sqrt(pi) 0.5), and neighbours d apart are correlated by exp(-d^2/(4 0.25)).
-  Profile profile;
-  for (int i = 0; i < 200; ++i) {
-    profile.height.push_back(0.05 + 0.1 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
-  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
-  EXPECT_EQ(blurred.kernel.kind, KernelKind::gaussian);
-  EXPECT_EQ(blurred.kernel.width, 0.5);
-  EXPECT_NEAR(blurred.rows_seen, std::exp(-2.0 * std::pow(3.14159265358979 * 0.5 / 0.8660254, 2)), 1e-6);
-  ASSERT_EQ(blurred.profile.height.size(), 200U);
-  EXPECT_NEAR(blurred.profile.number_density[100], 0.7, 1e-4);
-  EXPECT_NEAR(blurred.profile.number_density[0], 0.7 * kernel_cumulative({KernelKind::gaussian, 0.5}, 0.05), 1e-2);
-  const double variance = 0.01 * 0.1 / (2.0 * std::sqrt(3.14159265358979) * 0.5);
-  EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(variance), 1.0, 1e-3);
-  EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 107] / variance, std::exp(-0.49), 1e-3);
-}
-
-TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
-  Profile profile;
-  for (int i = 0; i < 50; ++i) {
-    profile.height.push_back(0.25 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
-  const Kernel wide{KernelKind::gaussian, 0.5};
-  EXPECT_EQ(blur_rows(profile, wide, 0.0).profile.number_density, profile.number_density);
-  EXPECT_EQ(blur_rows(profile, wide, 0.0).kernel.width, 0.5);
-  Profile coarse = profile;  // heights 1 D apart cannot be blurred by 0.5 D
-  for (double& height : coarse.height) height *= 4.0;
-  EXPECT_EQ(blur_rows(coarse, {}, 0.0).kernel.kind, KernelKind::none);
-  EXPECT_EQ(blur_rows(coarse, {}, 0.0).rows_seen, 1.0);
-  Profile two = profile;  // no rows to speak of
-  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error}) values->resize(2);
-  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::none);
-  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error})
-    values->push_back(values == &two.height ? 0.5 : values->back());
-  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::gaussian) << "three";
-  Profile bare = profile;
-  bare.std_error.clear();
-  EXPECT_EQ(blur_rows(bare, {}, 0.0).profile.number_density, bare.number_density);
-  Profile broken = profile;  // to be refused with its place, not blurred
-  broken.std_error[3] = -0.1;
-  EXPECT_EQ(blur_rows(broken, {}, 0.0).profile.std_error, broken.std_error);
-  // A profile that begins in the middle of a bed loses the heights that lack what lies below.
-  EXPECT_NEAR(blur_rows(profile, {}, -5.0).profile.height.front(), 2.0, 1e-12);
 }
 
 TEST(Answer, FindsTheSolidOfAColdBed) {

@@ -52,6 +52,7 @@ TEST(Audit, EveryRowSpeaks) {
     if (r.is_numeric) {
       EXPECT_TRUE(std::isfinite(r.recomputed));
       EXPECT_NEAR(r.difference, r.recomputed - r.printed, 1e-12);
+      EXPECT_NEAR(r.relative_difference * r.printed, r.difference, 1e-12) << r.quantity;
     }
   }
 }

@@ -409,6 +409,34 @@ TEST(ObjectionsByHand, WeighErrors) {
   EXPECT_THAT(objections(flat), ElementsAre(HasSubstr("The density does not fall by more than its errors")));
 }
 
+// Five heights within a diameter: errors of their own are sqrt(5) times less in the mean, common ones are not.
+TEST(ObjectionsByHand, AverageErrorsOverADiameter) {
+  const auto bed = [](double error, double common) {
+    Profile profile;
+    for (int i = 0; i < 40; ++i) {
+      profile.height.push_back(0.25 * i);
+      profile.number_density.push_back(i < 24 ? 1 : i < 32 ? 0.1 : 0);
+      profile.std_error.push_back(error);
+    }
+    if (common > 0) {
+      profile.covariance.assign(1600, common * common);
+      for (std::size_t i = 0; i < 40; ++i) profile.covariance[41 * i] += error * error - common * common;
+    }
+    return profile;
+  };
+  const std::string said = "Where the bed is densest, the relative error of the density is";
+  const auto speaks = [&](const Profile& profile) {
+    const std::vector<std::string> all = objections(profile);
+    return std::any_of(all.begin(), all.end(), [&](const std::string& one) { return one.starts_with(said); });
+  };
+  EXPECT_FALSE(speaks(bed(0.499 * std::sqrt(5), 0)));
+  EXPECT_TRUE(speaks(bed(0.501 * std::sqrt(5), 0)));
+  EXPECT_FALSE(speaks(bed(0.499, 0.4989)));
+  EXPECT_TRUE(speaks(bed(0.501, 0.5009)));
+  // A half in common, and of their own: 0.25 + (e^2 - 0.25)/5 at the limit 0.25.
+  EXPECT_TRUE(speaks(bed(0.52, 0.5)));
+}
+
 // What is missing below the densest height may be half of the bed; what lies above a gap a tenth.
 TEST(ObjectionsByHand, LookForGaps) {
   // At heights 0 to 8; 2 D below the greatest density are empty. Height 0 does not count.

@@ -73,6 +73,32 @@ TEST(Surrogate, DoesNotDependOnNamesAndUnits) {
   }
 }
 
+// Points are predicted in blocks; two outputs share their constants and nothing else.
+TEST(Surrogate, PredictsManyPointsAsOneByOne) {
+  const TrainingSet one = stand_in_runs(40, 0, 1), two = stand_in_runs(40, 1, 1);
+  ASSERT_EQ(one.points, two.points);
+  TrainingSet both = one;
+  both.outputs = 2;
+  both.values.clear();
+  for (std::size_t r = 0; r < 40; ++r) both.values.insert(both.values.end(), {one.values[r], two.values[r]});
+  const Surrogate surrogate = Surrogate::train(both);
+  std::mt19937_64 generator(8);
+  std::vector<double> points;
+  for (int i = 0; i < 3 * 150; ++i) points.push_back(even_number(generator));
+  const Surrogate::Prediction all = surrogate.predict(points);
+  ASSERT_EQ(all.mean.size(), 300U);
+  ASSERT_EQ(all.variance.size(), 300U);
+  ASSERT_EQ(all.scatter.size(), 300U);
+  for (std::size_t i = 0; i < 150; ++i) {
+    const auto alone = surrogate.predict(std::span<const double>(points).subspan(3 * i, 3));
+    for (std::size_t m = 0; m < 2; ++m) {
+      EXPECT_NEAR(all.mean[2 * i + m], alone.mean[m], 1e-9) << i;
+      EXPECT_NEAR(all.variance[2 * i + m] / alone.variance[m], 1, 1e-9) << i;
+      EXPECT_NEAR(all.scatter[2 * i + m] / alone.scatter[m], 1, 1e-9) << i;
+    }
+  }
+}
+
 TEST(Surrogate, NeedsRunsEnough) {
   TrainingSet few = stand_in_runs(10, 0, 1);
   EXPECT_THROW(Surrogate::train(few), std::invalid_argument);

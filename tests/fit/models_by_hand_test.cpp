@@ -247,6 +247,70 @@ TEST(FitNumbersByHand, HaveTheChanceOfSnedecorsF) {
   }
 }
 
+// Errors of 12 samples: 2.201 of them are 95 %, by Student's t of 11 degrees [any table], in both intervals.
+TEST(FitNumbersByHand, HaveStudentsIntervalsOfFewSamples) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
+  Profile data = synthetic::profile_of(truth, {}, 60, 16, 0.02, 4);
+  const std::size_t n = data.height.size();
+  data.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
+  data.covariance_samples = 12;
+  FitOptions options;
+  options.plateau_density = 1.10, options.sweep = options.compare = false;
+  options.model_error = false;
+  const FitResult fit = fit_profile(data, options);
+  ASSERT_TRUE(fit.ok());
+  ASSERT_FALSE(fit.misfit);
+  const double reach = std::exp(2.200985 * fit.statistical_error / fit.temperature.value);
+  EXPECT_NEAR(fit.next_bed_interval.high / fit.temperature.value, reach, 1e-6);
+  EXPECT_NEAR(fit.temperature.value / fit.next_bed_interval.low, reach, 1e-6);
+  // chi2 rises by as many of its units as t^2 says, whatever the weights.
+  const auto rise_at = [&](double confidence) {
+    options.confidence = confidence;
+    options.fixed_temperature.reset();
+    const Interval ends = fit_profile(data, options).temperature_interval;
+    options.fixed_temperature = ends.high;
+    return fit_profile(data, options).chi2 - fit.chi2;
+  };
+  // t at 97.5 % and at 90 % [any table]
+  EXPECT_NEAR(rise_at(0.95) / rise_at(0.8), std::pow(2.200985 / 1.363430, 2), 2e-3);
+}
+
+// Without errors the variance is one more parameter: -2 ln L is n ln(chi2/n) but for a constant, chi2 the sum of
+// squared residuals, and errors are those of their scatter.
+TEST(FitNumbersByHand, HaveTheCriteriaOfUnknownErrors) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
+  Profile data = synthetic::profile_of(truth, {}, 30, 16, 0.02, 4);
+  data.std_error.clear();
+  FitOptions options;
+  options.plateau_density = 1.10, options.sweep = options.interval = false;
+  options.window.low = 2, options.window.high = 14;
+  const FitResult fit = fit_profile(data, options);
+  ASSERT_TRUE(fit.ok());
+  double squares = 0, n = 0;
+  for (const Residual& one : fit.residuals) {
+    if (!one.used) continue;
+    squares += std::pow(one.density - one.model, 2), n += 1;
+    EXPECT_EQ(one.std_error, 0);
+  }
+  EXPECT_EQ(n, fit.bins);
+  EXPECT_NEAR(fit.chi2, squares, 1e-12);
+  EXPECT_NEAR(fit.chi2_per_dof, squares / (n - 2), 1e-12);
+  EXPECT_NEAR(fit.aic, n * std::log(squares / n) + 2 * 3, 1e-8);
+  EXPECT_NEAR(fit.bic, n * std::log(squares / n) + 3 * std::log(n), 1e-8);
+  EXPECT_TRUE(fit.errors_scaled);
+  EXPECT_FALSE(fit.misfit);
+  EXPECT_EQ(fit.model_error, 0);
+  // As of that scatter for every height.
+  data.std_error.assign(data.height.size(), std::sqrt(squares / (n - 2)));
+  const FitResult known = fit_profile(data, options);
+  EXPECT_NEAR(known.temperature.value, fit.temperature.value, 1e-8);
+  EXPECT_NEAR(known.temperature.std_error / fit.temperature.std_error, 1, 1e-6);
+  EXPECT_NEAR(known.chi2, n - 2, 1e-6);
+  EXPECT_NEAR(known.aic, n - 2 + 2 * 2, 1e-6);
+  EXPECT_NEAR(known.bic, n - 2 + 2 * std::log(n), 1e-6);
+}
+
 // From (1, 0): the farthest point first, then always the one that is farthest from all chosen.
 TEST(SpreadOutByHand, TakesTheFarthestPointInThePlane) {
   const std::vector<double> points{0, 0, 1, 0, 0, 2, 0.4, 0.1};

@@ -11,6 +11,7 @@
 #include "fit/profile_fit/chances.hpp"
 #include "fit/profile_fit/fit_profile.hpp"
 #include "fit/theory/expansion.hpp"
+#include "fit/theory/hydrostatic_profile.hpp"
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/formats/profile_csv.hpp"
@@ -237,15 +238,18 @@ TEST_F(FitByHand, AnswersForABedOnItsBase) {
   const auto answer = [&](const std::string& base) {
     return fit_.run(R"({ "sweep": false, "compare": false, "answer": true)" + base + " }")["answer"].dump();
   };
-  std::string whole = smoothed + "height,number_density,std_error\n";  // of 9.6 rows: from the base to the tail
-  for (int i = 0; i < 100; ++i) {
-    const double z = 0.125 * i;
-    whole += number_text(z) + "," + number_text(z < 8 ? 1.1 : 1.1 * std::exp(-(z - 8) / 0.4)) + ",0.01\n";
-  }
+  const double base = 0.5 - std::sqrt(3) / 4;
+  std::string whole = smoothed + "height,number_density,std_error\n";  // a column at 0.5 m g D, to its tail
+  const auto column = fit::HydrostaticProfile::of_column(fit::best_of(), 0.5, {9.3, fit::close_packing_density});
+  std::vector<double> above, densities(60);
+  for (int i = 0; i < 60; ++i) above.push_back(0.25 * (i + 0.5));
+  column.sample(above, {KernelKind::gaussian, 0.5}, densities);
+  for (std::size_t i = 0; i < above.size(); ++i)
+    whole += number_text(above[i] + base) + "," + number_text(densities[i]) + ",0.01\n";
   add_bed("bed", whole, bed_json(0, [](BedDescription& bed) { bed.count = 93; }));
   const std::string plain = answer("");
   EXPECT_THAT(plain, HasSubstr("\"temperature\""));
-  EXPECT_EQ(answer(", \"base\": " + number_text(0.5 - std::sqrt(3) / 4)), plain);
+  EXPECT_EQ(answer(", \"base\": " + number_text(base)), plain);
   EXPECT_NE(answer(", \"base\": 0.5"), plain);
 }
 

@@ -325,6 +325,25 @@ TEST_F(BedsOfAFormula, HaveThePosteriorOfALine) {
   EXPECT_NEAR(fit.chi2[1], 4, 0.4);
   EXPECT_GT(known.near->within(rise_)[1], 0.9);
   EXPECT_NEAR(known.near->average(rise_, std::vector<double>{0.25})[0], 4, 0.1);
+  // The evidence is the mean likelihood over the whole prior, though only the region was sampled.
+  ASSERT_LT(known.region.volume(), 0.8);
+  std::vector<double> grid;
+  for (int i = 0; i < 1000; ++i) grid.push_back((i + 0.5) / 1000);
+  double likelihood = 0;
+  for (const double one : known.near->fit(grid, {target}).log_likelihood) likelihood += std::exp(one) / 1000;
+  EXPECT_NEAR(known.posterior.log_evidence, std::log(likelihood), 0.05);
+}
+
+// Forty-eight beds are 0.05 off, six 0.2 and six 0.35: their standard deviation is 0.135.
+TEST_F(BedsOfAFormula, LieWithinOneOrTwoDeviations) {
+  for (std::size_t i = 0; i < beds_.size(); ++i) {
+    const double x = (beds_[i].values[0] - 2) / 4, size = i % 10 == 3 ? 0.2 : i % 10 == 8 ? 0.35 : 0.05;
+    beds_[i].numbers[rise_] = 3 + 4 * x + (i / 10 % 2 == i % 2 ? size : -size);
+  }
+  const BedSurrogate all{options_, beds_, {{rise_, 5, 0.3, 0, 0.3}}, BedSurrogate::Training{{{0}, {1}}, false, 1}};
+  EXPECT_NEAR(all.scatter(rise_), 0.135, 0.02);
+  EXPECT_NEAR(all.within(rise_)[0], 0.8, 0.02);
+  EXPECT_NEAR(all.within(rise_)[1], 0.9, 0.02);
 }
 
 // An error that includes the scatter counts it once.

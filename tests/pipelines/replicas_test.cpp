@@ -132,6 +132,23 @@ TEST(Replicas, ThatDifferOrChangeHaveTheirNumbers) {
   EXPECT_FALSE(notable_drift_of(with(bed(1e-12, 0.1), 1e-12, 0.1, 0.5)));
 }
 
+// Of two beds: their mean, and Student's 12.706 over the normal 1.960 times their spread, or the root mean square of
+// what they state, over sqrt(2).
+void expect_joined(const BedMeasurement& a, const BedMeasurement& b) {
+  const sim::Profile one = a.bed().density(false), two = b.bed().density(false), both = joined_density({&a, &b}, false);
+  ASSERT_EQ(both.height, one.height);
+  EXPECT_EQ(both.samples, 2 * one.samples);
+  int by_own_errors = 0;
+  for (std::size_t i = 0; i < both.height.size(); ++i) {
+    EXPECT_NEAR(both.number_density[i], (one.number_density[i] + two.number_density[i]) / 2, 1e-14);
+    const double spread = std::abs(one.number_density[i] - two.number_density[i]) / std::sqrt(2);
+    const double own = std::hypot(one.std_error[i], two.std_error[i]) / std::sqrt(2);
+    EXPECT_NEAR(both.std_error[i], std::max(12.706205 / 1.959964 * spread, own) / std::sqrt(2), 1e-6 * own) << i;
+    by_own_errors += own > 6.6 * spread && std::abs(one.std_error[i] / two.std_error[i] - 1) > 1e-4;
+  }
+  EXPECT_GE(by_own_errors, 3);
+}
+
 // The same bed twice agrees better than chance: what both show of their densities by themselves is halved, and no less.
 // Where the errors of the mean are larger, all of it grows until its trace is the sum of their squares.
 TEST(Replicas, ThatAgreeHaveTheCovarianceOfWhatEachShows) {
@@ -142,18 +159,20 @@ TEST(Replicas, ThatAgreeHaveTheCovarianceOfWhatEachShows) {
   scene.box.sides = sim::PeriodicSides{};
   scene.box.floor = sim::SinusoidalFloor{.amplitude = 0.55, .frequency = 0.37};
   const auto simulation = sim::simulate(scene);
-  BedMeasurement bed(
-      scene, simulation->properties(),
-      {.phases = 1, .period = 1 / 0.37, .grid = {0.5, 0.5, 12}, .kernel = measuring_kernel, .observe = {}});
+  const MeasurementPlan plan{
+      .phases = 1, .period = 1 / 0.37, .grid = {0.5, 0.5, 12}, .kernel = measuring_kernel, .observe = {}};
+  BedMeasurement bed(scene, simulation->properties(), plan), shorter(scene, simulation->properties(), plan);
   simulation->advance_to(20 / 0.37);
-  bed.begin(*simulation);
+  bed.begin(*simulation), shorter.begin(*simulation);
   sim::Snapshot at;
   for (int period = 0; period < 80; ++period) {
     simulation->snapshot(at);
     bed.look(*simulation, at, 0, false);
+    if (period < 79) shorter.look(*simulation, at, 0, false);
     simulation->advance_to((21 + period) / 0.37);
   }
-  bed.end(*simulation);
+  bed.end(*simulation), shorter.end(*simulation);
+  expect_joined(bed, shorter);
   sim::Profile joined = bed.bed().density(false);
   const sim::FilledHeights rows = sim::filled_heights(joined);
   const std::size_t n = rows.last - rows.first;

@@ -89,6 +89,30 @@ TEST_F(ScalingOfAGrid, UsesThePointsAskedFor) {
   EXPECT_TRUE(scaling_.warnings.empty());
 }
 
+// T = 5 V with errors of 1, 2 and 6 %: each becomes their root mean square, sqrt(41/3) %. ln V has the spread 2 ln^2 2
+// about ln 2.
+TEST_F(ScalingOfAGrid, GivesEveryPointTheSamePart) {
+  write_text(scaling_.file("table.csv"), "series,V,T,T_error\nall,1,5,0.05\nall,2,10,0.2\nall,4,20,1.2\n");
+  const std::string ask = R"({"fits": [{"name": "law", "y": "T", "powers": ["V"], "common_error": )", part = "true}]}",
+                    own = "false}]}";
+  const double error = std::sqrt(41.0 / 3) / 100;
+  const Json found = scaling_.run(ask + part)["law"];
+  EXPECT_NEAR(found["exponents"]["V"]["std_error"].get<double>(), error / (std::sqrt(2) * std::log(2)), 1e-9);
+  EXPECT_NEAR(found["amplitude"]["std_error"].get<double>(), 5 * error * std::sqrt(1.0 / 3 + 1.0 / 2), 1e-9);
+  const NumberTable points(scaling_.output("law.csv"));
+  for (std::size_t r = 0; r < 3; ++r) EXPECT_NEAR(points("y_error", r), error * points("y", r), 1e-9) << r;
+  scaling_.run(ask + own);
+  const NumberTable own_errors(scaling_.output("law.csv"));
+  EXPECT_NEAR(own_errors("y_error", 2), 1.2, 1e-12);
+  EXPECT_NEAR(own_errors("ratio_error", 2), 1.2 / 20, 1e-6);
+  // From a line through ln T + (ln 2, 0, 0) each point is off by ln 2 (1, -2, 1)/6.
+  write_text(scaling_.file("table.csv"), "series,V,T,T_error\nall,1,10,0.1\nall,2,10,0.2\nall,4,20,1.2\n");
+  const Json off = scaling_.run(ask + part)["law"];
+  EXPECT_EQ(off["dof"], 1);
+  EXPECT_NEAR(off["chi2"].get<double>(), std::pow(std::log(2) / error, 2) / 6, 1e-6);
+  EXPECT_NEAR(off["rms_log_ratio"].get<double>(), std::log(2) / std::sqrt(18), 1e-9);
+}
+
 TEST_F(ScalingOfAGrid, SaysWhyThereIsNoFit) {
   const Json found = scaling_.run(R"({"fits": [{"name": "law", "y": "T", "powers": ["V", "N"],
                                                 "within": {"N": {"most": 20}, "V": {"most": 2.5}}}]})")["law"];

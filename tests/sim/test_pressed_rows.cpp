@@ -98,6 +98,26 @@ TEST(PressedRows, HaveEveryTwoThatAreNearInOneLane) {
   }
 }
 
+// Of boxes that hold one to three columns of disks, and of fewer disks than lanes.
+TEST(PressedRows, OfNarrowBoxesAndFewDisksAreComplete) {
+  std::vector<Packing> packings{random_packing(1, 0), random_packing(2.2, 0)};
+  for (const double width : {2.4, 3.0, 3.4, 4.7}) packings.push_back(random_packing(width, width));
+  for (std::size_t few = 1; few <= 6; ++few) {
+    Packing packing = hexagonal(2, 3, 0.02);
+    packing.x.resize(few), packing.z.resize(few);
+    packings.push_back(packing);
+  }
+  for (const Packing& packing : packings) {
+    SCOPED_TRACE(testing::Message() << packing.width << " " << packing.x.size());
+    PressedRows rows;
+    const auto count = static_cast<std::uint32_t>(packing.x.size());
+    rows.find(packing.x, packing.z, count, packing.width, packing.period, neighbour_reach);
+    ASSERT_EQ(rows.order().size(), count);
+    const Pairs near = all_near(packing), listed = pairs_of(rows);
+    EXPECT_TRUE(std::includes(listed.begin(), listed.end(), near.begin(), near.end()));
+  }
+}
+
 TEST(PressedRows, BeginWithThePairsSideBySide) {
   const Packing packing = hexagonal(9, 12, 0.02);
   PressedRows rows;
@@ -133,6 +153,28 @@ TEST(PressedRows, FollowARowAroundPeriodicSides) {
     const double step = packing.x[rows.order()[place + 1]] - packing.x[rows.order()[place]];
     EXPECT_DOUBLE_EQ(step - 8 * std::floor(step / 8), 1) << place;
   }
+}
+
+// Every second disk lies a little higher. Right of the lower row's last lie two: one 19 degrees up, one 24 degrees
+// down.
+TEST(PressedRows, FollowTheMostLevelNeighbour) {
+  Packing packing{10, 0, {}, {}};
+  for (int r = 0; r < 2; ++r)
+    for (int i = 0; i < 8; ++i) {
+      packing.x.push_back(0.5 + i + 0.5 * r);
+      packing.z.push_back(0.5 + 0.87 * r + (i % 2 == 0 ? 0 : 0.04));
+    }
+  packing.x.insert(packing.x.end(), {8.5, 8.4});
+  packing.z.insert(packing.z.end(), {0.88, 0.14});
+  const std::vector<std::uint32_t> expected{17, 0, 1, 2, 3, 4, 5, 6, 7, 16, 8, 9, 10, 11, 12, 13, 14, 15};
+  PressedRows rows;
+  rows.find(packing.x, packing.z, 18, packing.width, 0, neighbour_reach);
+  EXPECT_EQ(rows.order(), expected);
+  // The same row from the other side: what is most level to the left.
+  for (double& x : packing.x) x = 10 - x;
+  rows.find(packing.x, packing.z, 18, packing.width, 0, neighbour_reach);
+  const std::vector<std::uint32_t> mirrored{17, 16, 7, 6, 5, 4, 3, 2, 1, 0, 15, 14, 13, 12, 11, 10, 9, 8};
+  EXPECT_EQ(rows.order(), mirrored);
 }
 
 // The same disks in another order are the same rows.

@@ -1,0 +1,25 @@
+// A bed whose answer is asked for, without layers.
+#pragma once
+
+#include <cstdint>
+
+#include "fit/profile_fit/answer.hpp"
+#include "fit/theory/equation_of_state.hpp"
+#include "tests/fit/synthetic.hpp"
+
+namespace shakebed::fit {
+
+inline const Kernel usual_kernel{KernelKind::gaussian, 0.5};
+
+// A column of the accurate equation of state, of 20 D, with noise: what a bed would be without layers.
+inline AnswerInput column(double temperature, double noise = 0.003, std::uint64_t seed = 5) {
+  const auto truth = HydrostaticProfile::of_column(best_of(), temperature, {20.0, close_packing_density});
+  AnswerInput input;
+  input.kernel = usual_kernel;
+  input.base = 0.0;
+  const int bins = static_cast<int>(4.0 * synthetic::top_of(truth));
+  input.profile = synthetic::profile_of(truth, usual_kernel, bins, synthetic::top_of(truth), noise, seed);
+  return input;
+}
+
+}  // namespace shakebed::fit

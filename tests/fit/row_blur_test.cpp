@@ -1,0 +1,96 @@
+// The rows of a crystal, blurred away.
+#include "fit/profile_fit/row_blur.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "statistics/kernel.hpp"
+
+namespace shakebed::fit {
+namespace {
+
+TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
+  // White noise of 0.1 every 0.1 D on a flat density of 0.7, at points. Blurred by 0.5 D its variance is that times
+  // 0.1/(2 sqrt(pi) 0.5), and neighbours d apart are correlated by exp(-d^2/(4 0.25)).
+  Profile profile;
+  for (int i = 0; i < 200; ++i) {
+    profile.height.push_back(0.05 + 0.1 * i);
+    profile.number_density.push_back(0.7);
+    profile.std_error.push_back(0.1);
+  }
+  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
+  EXPECT_EQ(blurred.kernel.kind, KernelKind::gaussian);
+  EXPECT_EQ(blurred.kernel.width, 0.5);
+  EXPECT_NEAR(blurred.rows_seen, std::exp(-2.0 * std::pow(3.14159265358979 * 0.5 / 0.8660254, 2)), 1e-6);
+  ASSERT_EQ(blurred.profile.height.size(), 200U);
+  EXPECT_NEAR(blurred.profile.number_density[100], 0.7, 1e-4);
+  EXPECT_NEAR(blurred.profile.number_density[0], 0.7 * kernel_cumulative({KernelKind::gaussian, 0.5}, 0.05), 1e-2);
+  const double variance = 0.01 * 0.1 / (2.0 * std::sqrt(3.14159265358979) * 0.5);
+  EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(variance), 1.0, 1e-3);
+  EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 107] / variance, std::exp(-0.49), 1e-3);
+}
+
+// What a kernel lacks of the variance 0.25 D^2 is blurred into the profile, whatever its form; and what it leaves of a
+// crystal's rows is its Fourier transform at their distance. Both are integrals over the kernel, summed here.
+TEST(RowBlur, GoesByTheMomentsOfTheKernel) {
+  Profile profile;
+  for (int i = 0; i < 200; ++i) {
+    profile.height.push_back(0.05 + 0.1 * i);
+    profile.number_density.push_back(0.7);
+    profile.std_error.push_back(0.1);
+  }
+  Profile bare = profile;  // without errors it is left as it is
+  bare.std_error.clear();
+  for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.2}, Kernel{KernelKind::top_hat, 1.0},
+                               Kernel{KernelKind::disk_chord, 1.0}, Kernel{KernelKind::disk_chord, 0.4}}) {
+    double variance = 0, wave = 0;
+    constexpr int steps = 200'000;
+    for (int i = 0; i < steps; ++i) {
+      const double x = 1.5 * (2 * (i + 0.5) / steps - 1), weight = kernel_density(kernel, x) * 3 / steps;
+      variance += weight * x * x;
+      wave += weight * std::cos(2 * std::numbers::pi * x / (std::numbers::sqrt3 / 2));
+    }
+    EXPECT_NEAR(blur_rows(bare, kernel, 0.0).rows_seen, std::abs(wave), 1e-4) << to_string(kernel.kind);
+    const BlurredProfile blurred = blur_rows(profile, kernel, 0.0);
+    EXPECT_EQ(blurred.kernel.width, 0.5);
+    const double by = std::sqrt(0.25 - variance), of_noise = 0.01 * 0.1 / (2 * std::sqrt(std::numbers::pi) * by);
+    EXPECT_NEAR(blurred.profile.std_error[100] / std::sqrt(of_noise), 1, 1e-3) << to_string(kernel.kind);
+    EXPECT_NEAR(blurred.profile.covariance[100 * 200 + 105] / of_noise, std::exp(-0.25 / (4 * by * by)), 1e-3);
+  }
+}
+
+TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
+  Profile profile;
+  for (int i = 0; i < 50; ++i) {
+    profile.height.push_back(0.25 * i);
+    profile.number_density.push_back(0.7);
+    profile.std_error.push_back(0.1);
+  }
+  const Kernel wide{KernelKind::gaussian, 0.5};
+  EXPECT_EQ(blur_rows(profile, wide, 0.0).profile.number_density, profile.number_density);
+  EXPECT_EQ(blur_rows(profile, wide, 0.0).kernel.width, 0.5);
+  Profile coarse = profile;  // heights 1 D apart cannot be blurred by 0.5 D
+  for (double& height : coarse.height) height *= 4.0;
+  EXPECT_EQ(blur_rows(coarse, {}, 0.0).kernel.kind, KernelKind::none);
+  EXPECT_EQ(blur_rows(coarse, {}, 0.0).rows_seen, 1.0);
+  Profile two = profile;  // no rows to speak of
+  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error}) values->resize(2);
+  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::none);
+  for (std::vector<double>* values : {&two.height, &two.number_density, &two.std_error})
+    values->push_back(values == &two.height ? 0.5 : values->back());
+  EXPECT_EQ(blur_rows(two, {}, 0.0).kernel.kind, KernelKind::gaussian) << "three";
+  Profile bare = profile;
+  bare.std_error.clear();
+  EXPECT_EQ(blur_rows(bare, {}, 0.0).profile.number_density, bare.number_density);
+  Profile broken = profile;  // to be refused with its place, not blurred
+  broken.std_error[3] = -0.1;
+  EXPECT_EQ(blur_rows(broken, {}, 0.0).profile.std_error, broken.std_error);
+  // A profile that begins in the middle of a bed loses the heights that lack what lies below.
+  EXPECT_NEAR(blur_rows(profile, {}, -5.0).profile.height.front(), 2.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace shakebed::fit
