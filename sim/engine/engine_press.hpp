@@ -54,9 +54,9 @@ inline constexpr double least_carried = 0.2;
 // What springs that are still compressed may gain thereby, a check: of disks in flight [m g D], each; of the kinetic
 // energy against the floor.
 inline constexpr double gained_by_hardening = 1e-6, gained_of_motion = 1e-3;
-// Of the contact time at most, between two checks. A part of what the springs hold is lost thereby. With 1.05 in place
-// of 1.01 smooth beds at Gamma = 1.5 are a tenth too cold; in place of 1.005 rough ones at Gamma = 1.2 have a fifth of
-// the T_z of soft spheres. Smooth ones that are very cold, by T_x [m g D], hold nothing that counts.
+// Of the contact time at most, between two checks. A part of what the springs hold is lost thereby. With 1.05 for all,
+// smooth beds at Gamma = 1.5 are a tenth too cold, and rough ones at Gamma = 1.2 have a fifth of the T_z of soft
+// spheres. Smooth ones that are very cold, by T_x [m g D], hold nothing that counts.
 inline constexpr double softening = 1.01, softening_of_rough = 1.005, softening_of_very_cold = 1.05, very_cold = 0.003;
 inline constexpr double least_neighbours = 1;   // pairs a disk; rows on rows have three
 inline constexpr double neighbour_gap = 0.01;   // between two that are counted as such [D]
