@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/profile/photographs.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/by_hand.hpp"
 
@@ -62,6 +65,21 @@ TEST(OtherShade, IsLookedForInThePolarityAskedFor) {
   bright_alone.polarity = Polarity::bright_beads, dark_alone.polarity = Polarity::dark_beads;
   EXPECT_EQ(with_second_shade(bed, dark, bright_alone), 20U);
   EXPECT_EQ(with_second_shade(bed, dark, dark_alone), 14U);
+}
+
+// With nothing known of the picture.
+TEST(OtherShade, SmallBrightBeadsAreFoundBetweenDarkOnes) {
+  const BedOfShades bed(6, 7, 210);
+  const DisksFound found = find_disks(ImageView{
+      .width = bed.frame.width, .height = bed.frame.height, .pixels = bed.frame.pixels.data(), .type = PixelType::f32});
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.disks.size(), 20U);
+  for (const auto* shade : {&bed.dark, &bed.bright})
+    for (const RenderedDisk& bead : *shade)
+      EXPECT_TRUE(std::any_of(
+          found.disks.begin(), found.disks.end(),
+          [&](const FoundDisk& disk) { return std::hypot(disk.x_px - bead.x_px, disk.y_px - bead.y_px) < 1; }))
+          << bead.x_px << ", " << bead.y_px;
 }
 
 TEST(OtherShade, IsNotLookedForWithoutBeadsRimsOrPixelsOfTheirOwn) {
