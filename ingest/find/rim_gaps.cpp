@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "ingest/find/nearby.hpp"
-#include "ingest/find/outline.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
@@ -36,9 +35,6 @@ constexpr double fewest_small = 6, least_share_of_small = 0.1;
 // Mean probability of sizes outside a spread: drawn beads 0.95 or more, fringes in disks that were missed 0.78 at most.
 constexpr double least_sure_far_off = 0.9;
 constexpr int most_sizes_tried = 3;
-// Shares of outlines that are plainly not round: of beads hardly any, of circles in the ends of tablets all. Beads of
-// further sizes in six photographs 0 to 0.09, with fringes 0.65 and more, and then those of the first size as well.
-constexpr double hardly_any_end = 0.2, nearly_all_ends = 0.8;
 // A bead gives its place to a larger one for which at least this speaks, where less than this share of it speaks for
 // the bead. Beads found inside coins: a fifth to a third.
 constexpr double sure_rival = 0.9, small_share_of_evidence = 0.5;
@@ -270,7 +266,7 @@ struct WithCopies {
 class OtherSizes {
  public:
   OtherSizes(PictureMaps& maps, const RimModel& model, std::vector<Circle>& known)
-      : maps_(maps), model_(model), known_(known), of_one_size_(known.size()) {
+      : model_(model), known_(known), of_one_size_(static_cast<double>(known.size())) {
     const double radius = model.radius_px;
     constexpr std::array<double, 5> limits = {smallest_shared, smallest_spread, 1, largest_spread, largest_shared};
     for (std::size_t k = 0; k + 1 < limits.size(); ++k) {
@@ -381,8 +377,7 @@ class OtherSizes {
     take_likely(search.picture, band.probability, nullptr, with_these, taken);
     double expected = 0;
     for (const GapCircle& one : taken) expected += one.probability;
-    if (!believed(band, expected, static_cast<double>(taken.size())) || !as_round_as_the_beads(taken))
-      return std::nullopt;
+    if (!believed(band, expected, static_cast<double>(taken.size()))) return std::nullopt;
     band.radius_px = shared_radius(taken);
     known_ = std::move(with_these);
     return band;
@@ -390,32 +385,10 @@ class OtherSizes {
 
   [[nodiscard]] bool believed(const SizeBand& band, double expected, double taken) const {
     const double middle = 0.5 * (band.from_px + band.to_px) / model_.radius_px;
-    const auto of_one_size = static_cast<double>(of_one_size_);
     const bool small = middle < smallest_spread, far_off = small || middle > largest_spread;
     if (far_off && expected < least_sure_far_off * taken) return false;
-    if (small) return expected >= std::max(fewest_small, least_share_of_small * of_one_size);
-    return expected >= std::max(fewest_others, least_share_of_others * of_one_size);
-  }
-
-  [[nodiscard]] double share_not_round(std::vector<Circle> circles) const {
-    std::vector<double> radii;
-    for (const Circle& circle : circles) radii.push_back(circle.radius);
-    const PictureMap& map = maps_.scaled_for(median_of(std::move(radii)), model_.threshold);
-    for (Circle& circle : circles) {
-      circle.x = map.at.from_frame_x(circle.x), circle.y = map.at.from_frame_y(circle.y);
-      circle.radius /= map.at.scale;
-    }
-    return roundness_of(map.edges, circles, model_.polarity).not_round;
-  }
-
-  // Where the beads of the first size have round outlines, those of another size have, too. The ends of tablets and
-  // rods are circles for the most part of their rims, but their outlines go on.
-  [[nodiscard]] bool as_round_as_the_beads(const std::vector<GapCircle>& taken) const {
-    std::vector<Circle> others;
-    for (const GapCircle& one : taken) others.push_back(one.circle);
-    const auto beads_end = known_.begin() + static_cast<std::ptrdiff_t>(of_one_size_);
-    return share_not_round(std::move(others)) < nearly_all_ends ||
-           share_not_round({known_.begin(), beads_end}) > hardly_any_end;
+    if (small) return expected >= std::max(fewest_small, least_share_of_small * of_one_size_);
+    return expected >= std::max(fewest_others, least_share_of_others * of_one_size_);
   }
 
   // The median radius where the radii hardly differ.
@@ -428,10 +401,9 @@ class OtherSizes {
     return 1.4826 * median_of(deviations) < hardly * middle ? middle : 0;
   }
 
-  PictureMaps& maps_;
   const RimModel& model_;
   std::vector<Circle>& known_;
-  std::size_t of_one_size_;  // the first of those known
+  double of_one_size_;
   std::vector<Group> groups_;
   std::vector<SizeBand> tried_;  // sizes of their own; where one is not believed, its circles may be of a spread
 };

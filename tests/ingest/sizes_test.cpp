@@ -257,37 +257,6 @@ TEST(Sizes, BeadsOfOneSizeHaveNoOthers) {
 }
 
 // A shadow's round end, of a tenth of the beads' contrast.
-// Capsules beside round tablets: the ends of each are half circles.
-GrayFrame with_capsules(const std::vector<Bead>& beads, double capsule_radius) {
-  GrayFrame frame = drawn(beads, 540, 400, 190, plain_face, 8);
-  for (int k = 0; k < 5; ++k) {
-    const double angle = 0.7 * k, x0 = 60 + 100.0 * k, y0 = 350, half = 1.7 * capsule_radius;
-    for (int row = 300; row < 400; ++row)
-      for (int column = 0; column < 540; ++column) {
-        const double x = column - x0, y = row - y0;
-        const double along = x * std::cos(angle) + y * std::sin(angle),
-                     across = y * std::cos(angle) - x * std::sin(angle);
-        const double inside = capsule_radius - std::hypot(std::max(0.0, std::abs(along) - half), across);
-        float& level = frame.pixels[static_cast<std::size_t>(row) * 540 + static_cast<std::size_t>(column)];
-        level -= static_cast<float>(110 * std::clamp(inside + 0.5, 0.0, 1.0));
-      }
-  }
-  return frame;
-}
-
-TEST(Sizes, TheEndsOfCapsulesAreNoSmallerBeads) {
-  std::vector<Bead> beads = scattered(30, {18}, 540, 290, 21);
-  ASSERT_EQ(beads.size(), 30U);
-  const GrayFrame frame = with_capsules(beads, 12);
-  FindOptions options;
-  options.seen = BeadsSeen{Polarity::dark_beads, 18};
-  const CalibrationResult learned = learn_beads({&frame}, options);
-  ASSERT_TRUE(learned.found) << learned.why_not;
-  const FindResult result = find_beads(frame, learned.calibration, options);
-  EXPECT_EQ(found_beads(result.disks, beads), 30U);
-  EXPECT_EQ(result.disks.size(), 30U);
-}
-
 TEST(Sizes, AFaintCircleIsNoBead) {
   std::vector<Bead> beads = scattered(40, {18}, 520, 460, 12);
   beads.back().radius = 18.01;
