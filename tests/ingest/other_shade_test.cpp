@@ -74,12 +74,15 @@ TEST(OtherShade, SmallBrightBeadsAreFoundBetweenDarkOnes) {
       .width = bed.frame.width, .height = bed.frame.height, .pixels = bed.frame.pixels.data(), .type = PixelType::f32});
   ASSERT_TRUE(found.ok()) << found.message;
   EXPECT_EQ(found.disks.size(), 20U);
-  for (const auto* shade : {&bed.dark, &bed.bright})
-    for (const RenderedDisk& bead : *shade)
-      EXPECT_TRUE(std::any_of(
-          found.disks.begin(), found.disks.end(),
-          [&](const FoundDisk& disk) { return std::hypot(disk.x_px - bead.x_px, disk.y_px - bead.y_px) < 1; }))
-          << bead.x_px << ", " << bead.y_px;
+  const auto beads_of = [&](const std::vector<RenderedDisk>& shade, double sign) {
+    return std::count_if(shade.begin(), shade.end(), [&](const RenderedDisk& bead) {
+      return std::any_of(found.disks.begin(), found.disks.end(), [&](const FoundDisk& disk) {
+        return std::hypot(disk.x_px - bead.x_px, disk.y_px - bead.y_px) < 1 && sign * disk.contrast > 0;
+      });
+    });
+  };
+  EXPECT_EQ(beads_of(bed.dark, 1), 14);
+  EXPECT_EQ(beads_of(bed.bright, -1), 6);
 }
 
 TEST(OtherShade, IsNotLookedForWithoutBeadsRimsOrPixelsOfTheirOwn) {
