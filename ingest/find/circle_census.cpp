@@ -23,6 +23,7 @@ constexpr double few_asked = 0.8;
 constexpr int census_window = 640;  // px, of the busiest part searched at each level
 constexpr double mode_width = 0.1;  // radii of one hypothesis, either way
 constexpr double faintest_census_support = 0.35, least_asked = 0.4;
+constexpr std::size_t most_hypotheses = 12;
 constexpr double full_contrast_share = 0.3;  // of the picture's range of levels: such an edge counts in full
 
 ScaledPicture windowed(const GrayFrame& picture, double scale, int side) {
@@ -181,12 +182,11 @@ class Census {
               [](const CircleHypothesis& a, const CircleHypothesis& b) { return a.gain_px > b.gain_px; });
     for (CircleHypothesis& one : all_) {
       constexpr double another = 1.15;
-      constexpr std::size_t most = 12;
       const bool known = std::any_of(census_.hypotheses.begin(), census_.hypotheses.end(), [&](const auto& other) {
         return other.channel == one.channel && other.polarity == one.polarity &&
                std::max(other.radius_px / one.radius_px, one.radius_px / other.radius_px) < another;
       });
-      if (!known && census_.hypotheses.size() < most) census_.hypotheses.push_back(std::move(one));
+      if (!known && census_.hypotheses.size() < most_hypotheses) census_.hypotheses.push_back(std::move(one));
     }
     return std::move(census_);
   }
@@ -199,10 +199,26 @@ class Census {
 
 }  // namespace
 
-CircleCensus take_census(const std::vector<const GrayFrame*>& channels, const CensusOptions& options) {
+CircleCensus census_of(const GrayFrame& frame, std::size_t channel, const CensusOptions& options) {
   Census census(options);
-  for (std::size_t channel = 0; channel < channels.size(); ++channel) census.search(channel, *channels[channel]);
+  census.search(channel, frame);
   return census.result();
+}
+
+void add_census(const CircleCensus& other, CircleCensus& census) {
+  std::vector<CircleHypothesis>& all = census.hypotheses;
+  all.insert(all.end(), other.hypotheses.begin(), other.hypotheses.end());
+  std::stable_sort(all.begin(), all.end(),
+                   [](const CircleHypothesis& a, const CircleHypothesis& b) { return a.gain_px > b.gain_px; });
+  if (all.size() > most_hypotheses) all.resize(most_hypotheses);
+  census.best_by_chance_px = std::max(census.best_by_chance_px, other.best_by_chance_px);
+}
+
+CircleCensus take_census(const std::vector<const GrayFrame*>& channels, const CensusOptions& options) {
+  CircleCensus census;
+  for (std::size_t channel = 0; channel < channels.size(); ++channel)
+    add_census(census_of(*channels[channel], channel, options), census);
+  return census;
 }
 
 }  // namespace shakebed::ingest

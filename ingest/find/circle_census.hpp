@@ -48,4 +48,8 @@ struct CircleCensus {
 
 CircleCensus take_census(const std::vector<const GrayFrame*>& channels, const CensusOptions& options = {});
 
+// Of one channel, whose number its hypotheses get; and of this one and others together.
+CircleCensus census_of(const GrayFrame& frame, std::size_t channel, const CensusOptions& options = {});
+void add_census(const CircleCensus& other, CircleCensus& census);
+
 }  // namespace shakebed::ingest

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "ingest/find/vector_lanes.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
 
@@ -17,6 +18,7 @@ namespace {
 constexpr double least_alignment = 0.8;  // cosine between an edge's gradient and the ray
 constexpr double least_tolerance = 0.6;  // px: what pixels do to an edge's place
 constexpr double ray_step = 0.5;         // px
+constexpr int most_ray_steps = 64;
 
 struct Direction {
   double cosine, sine;
@@ -46,82 +48,87 @@ struct Met {
   double offset = 0;  // px outwards
   float slope = 0;    // grey levels per px
 };
+constexpr int most_directions = 64;  // Circle::met has a bit each
+using MetAround = std::array<Met, most_directions>;
 
-// Outwards through a rim at (x, y) [px]. `sign`: of the step that is looked for, see sign_of().
-struct RimRay {
-  float x, y, cosine, sine, sign;
-};
-// Gradients along a ray, from `most_ray_steps` inwards to as many outwards.
-constexpr int most_ray_steps = 64;
-struct AlongRay {
-  static const float* at(const std::array<float, 2 * most_ray_steps + 1>& steps, int k) {
-    return steps.data() + most_ray_steps + k;
-  }
-  std::array<float, 2 * most_ray_steps + 1> radial;   // grey levels per px
-  std::array<float, 2 * most_ray_steps + 1> aligned;  // the same; 0 where the gradient points elsewhere
-};
-
-// Steps `first` to `last`, all of them in the picture. Without branches, so that g++ takes several steps at once.
-AlongRay sampled(const EdgeMap& edges, const RimRay& ray, int first, int last) {
-  AlongRay out;
-  float *radial_at = out.radial.data() + most_ray_steps, *aligned_at = out.aligned.data() + most_ray_steps;
-  const float *along_x = edges.x.data(), *along_y = edges.y.data();
-  const int width = edges.width;
-  constexpr float least = static_cast<float>(least_alignment * least_alignment);
-  // As signed_by(): of either sign, the larger of both.
-  const float one = ray.sign == 0 ? 1.0F : ray.sign, other = ray.sign == 0 ? -1.0F : ray.sign;
-  const float x = ray.x, y = ray.y, cosine = ray.cosine, sine = ray.sine;
-  for (int k = first; k <= last; ++k) {
-    const float distance = static_cast<float>(k) * static_cast<float>(ray_step);
-    const float px = x + distance * cosine, py = y + distance * sine;
-    const int column = static_cast<int>(px), row = static_cast<int>(py);
-    const float right = px - static_cast<float>(column), lower = py - static_cast<float>(row);
-    const int at = row * width + column, below = at + width;
-    const float dx = (1 - lower) * ((1 - right) * along_x[at] + right * along_x[at + 1]) +
-                     lower * ((1 - right) * along_x[below] + right * along_x[below + 1]);
-    const float dy = (1 - lower) * ((1 - right) * along_y[at] + right * along_y[at + 1]) +
-                     lower * ((1 - right) * along_y[below] + right * along_y[below + 1]);
-    const float outwards = dx * cosine + dy * sine;
-    const float radial = one * outwards > other * outwards ? one * outwards : other * outwards;
-    radial_at[k] = radial;
-    aligned_at[k] = radial * radial < least * (dx * dx + dy * dy) ? 0 : radial;
-  }
-  return out;
+// Interpolated between pixels, `at` the upper left one.
+inline __attribute__((always_inline)) Floats between(const std::vector<float>& map, int width, const Ints& at,
+                                                     const Floats& right, const Floats& down) {
+  const float *upper = map.data(), *lower = upper + width;
+  Floats a, b, c, d;
+  gather(upper, at, a), gather(upper + 1, at, b), gather(lower, at, c), gather(lower + 1, at, d);
+  return (1 - down) * ((1 - right) * a + right * b) + down * ((1 - right) * c + right * d);
 }
 
-Met look_along(const EdgeMap& edges, const Circle& circle, double cosine, double sine, float sign, double reach) {
-  Met met;
-  const double rim_x = circle.x + circle.radius * cosine, rim_y = circle.y + circle.radius * sine;
-  const auto in_picture = [&](int k) {
-    const double x = rim_x + k * ray_step * cosine, y = rim_y + k * ray_step * sine;
-    return x >= 1 && y >= 1 && x < edges.width - 2 && y < edges.height - 2;
-  };
-  const int used = std::min(static_cast<int>(std::ceil(reach / ray_step)), most_ray_steps);
-  int first = -used, last = used;
-  while (first <= last && !in_picture(first)) ++first;
-  while (last >= first && !in_picture(last)) --last;
-  if (first > last) return met;
-  met.in_view = first <= 0 && last >= 0;
-  const AlongRay ray = sampled(edges,
-                               {static_cast<float>(rim_x), static_cast<float>(rim_y), static_cast<float>(cosine),
-                                static_cast<float>(sine), sign},
-                               first, last);
-  float best = edges.threshold;
-  int best_step = 0;
-  for (int k = first; k <= last; ++k) {
-    const float aligned = *AlongRay::at(ray.aligned, k);
-    if (aligned > best) best = aligned, best_step = k, met.edge = true;
+// The strongest edge along each of eight rays through the rim at (x, y) [px], up to `reach` steps from it.
+struct EightRays {
+  Floats x, y, cosine, sine;
+  Floats slope{}, before{}, after{};  // of the edge, and of the gradients along the ray beside it; grey levels per px
+  Ints step{}, in_view{};             // of the edge from the rim; whether the rim is in the picture
+
+  void look(const EdgeMap& edges, float sign, int reach) {
+    constexpr float least = static_cast<float>(least_alignment * least_alignment);
+    // As signed_by(): of either sign, the larger of both.
+    const float one = sign == 0 ? 1.0F : sign, other = sign == 0 ? -1.0F : sign;
+    const float right_end = static_cast<float>(edges.width - 2), lower_end = static_cast<float>(edges.height - 2);
+    slope = slope + edges.threshold;
+    step = step + 2 * most_ray_steps;  // none
+    Floats last = {};
+    for (int k = -reach; k <= reach; ++k) {
+      const float distance = static_cast<float>(k) * static_cast<float>(ray_step);
+      const Floats px = x + distance * cosine, py = y + distance * sine;
+      const Ints inside = (px >= 1) & (py >= 1) & (px < right_end) & (py < lower_end);
+      const Floats safe_x = inside ? px : last * 0, safe_y = inside ? py : last * 0;
+      const Ints column = __builtin_convertvector(safe_x, Ints), row = __builtin_convertvector(safe_y, Ints);
+      const Floats right = safe_x - __builtin_convertvector(column, Floats),
+                   down = safe_y - __builtin_convertvector(row, Floats);
+      const Ints at = row * edges.width + column;
+      const Floats dx = between(edges.x, edges.width, at, right, down),
+                   dy = between(edges.y, edges.width, at, right, down);
+      const Floats outwards = dx * cosine + dy * sine, nothing = {};
+      const Floats either = one * outwards > other * outwards ? one * outwards : other * outwards;
+      const Floats radial = inside ? either : nothing;
+      const Floats aligned = radial * radial < least * (dx * dx + dy * dy) ? nothing : radial;
+      after = step == k - 1 ? radial : after;
+      const Ints better = aligned > slope;
+      slope = better ? aligned : slope;
+      before = better ? last : before;
+      after = better ? nothing : after;
+      step = better ? k + 0 * step : step;
+      last = radial;
+      if (k == 0) in_view = inside;
+    }
   }
-  if (!met.edge) return met;
-  met.offset = best_step * ray_step;
-  met.slope = best;
-  if (best_step > -used && best_step < used) {
-    const auto radial = [&](int k) { return k < first || k > last ? 0.0F : *AlongRay::at(ray.radial, k); };
-    const float before = radial(best_step - 1), after = radial(best_step + 1);
-    const float bend = before - 2 * best + after;
-    if (bend < 0) met.offset += ray_step * std::clamp(0.5 * static_cast<double>((before - after) / bend), -0.5, 0.5);
+
+  [[nodiscard]] Met met(int ray, int reach) const {
+    Met met;
+    met.in_view = in_view[ray] != 0;
+    met.edge = step[ray] <= reach;
+    if (!met.edge) return met;
+    met.offset = step[ray] * ray_step;
+    met.slope = slope[ray];
+    if (step[ray] == -reach || step[ray] == reach) return met;
+    const float bend = before[ray] - 2 * slope[ray] + after[ray];
+    if (bend < 0)
+      met.offset += ray_step * std::clamp(0.5 * static_cast<double>((before[ray] - after[ray]) / bend), -0.5, 0.5);
+    return met;
   }
-  return met;
+};
+
+// In `count` directions from the centre of a circle, a multiple of eight.
+void look_around(const EdgeMap& edges, const Circle& circle, int count, float sign, double reach, MetAround& met) {
+  const int steps = std::min(static_cast<int>(std::ceil(reach / ray_step)), most_ray_steps);
+  for (int first = 0; first < count; first += lanes) {
+    EightRays rays;
+    for (int l = 0; l < lanes; ++l) {
+      const auto [cosine, sine] = direction_of(first + l, count);
+      rays.x[l] = static_cast<float>(circle.x + circle.radius * cosine);
+      rays.y[l] = static_cast<float>(circle.y + circle.radius * sine);
+      rays.cosine[l] = static_cast<float>(cosine), rays.sine[l] = static_cast<float>(sine);
+    }
+    rays.look(edges, sign, steps);
+    for (int l = 0; l < lanes; ++l) met[static_cast<std::size_t>(first + l)] = rays.met(l, steps);
+  }
 }
 
 struct MetEdge {
@@ -173,7 +180,7 @@ CircleStep step_towards(const std::vector<MetEdge>& met, int rays) {
 
 // A quick look: enough of the pixels near the rim have a gradient along the radius.
 bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, double reach) {
-  constexpr int looks = 16;
+  constexpr int looks = 16, fewest_met = 6;
   int in_view = 0, met = 0;
   for (int k = 0; k < looks; ++k) {
     const auto [cosine, sine] = direction_of(k, looks);
@@ -188,11 +195,13 @@ bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, doubl
           signed_by(sign, edges.x[at] * static_cast<float>(cosine) + edges.y[at] * static_cast<float>(sine));
       edge = edge || (radial > edges.threshold &&
                       radial * radial > 0.6F * (edges.x[at] * edges.x[at] + edges.y[at] * edges.y[at]));
+      if (edge) break;
     }
     in_view += seen;
     met += edge;
+    if (met + looks - 1 - k < fewest_met) return false;
   }
-  return met >= 6 && 10 * met >= 4 * in_view;
+  return met >= fewest_met && 10 * met >= 4 * in_view;
 }
 
 // Votes for centres one radius away from each edge, and where most are gathered in 3 x 3 pixels. The tables are kept
@@ -363,6 +372,7 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
   Circle circle = start;
   if (!worth_fitting(edges, start, sign, std::max(1.2, rays.reach * start.radius))) return circle;
   constexpr int rounds = 3;
+  MetAround around;
   std::vector<MetEdge> met;
   std::vector<float> slopes;
   for (int round = 0; round <= rounds; ++round) {
@@ -375,9 +385,10 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
     circle.directions = rays.count;
     int in_view = 0;
     double square = 0;
+    look_around(edges, circle, rays.count, sign, reach, around);
     for (int k = 0; k < rays.count; ++k) {
       const auto [cosine, sine] = direction_of(k, rays.count);
-      const Met one = look_along(edges, circle, cosine, sine, sign, reach);
+      const Met& one = around[static_cast<std::size_t>(k)];
       in_view += one.in_view;
       if (!one.edge || !one.in_view || std::abs(one.offset) > reach) continue;
       met.push_back({cosine, sine, one.offset});
@@ -412,11 +423,12 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
 double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polarity, std::uint64_t open, int fewest) {
   const float sign = sign_of(polarity);
   constexpr double reach = 0.15;  // radii
+  MetAround around;
+  look_around(edges, circle, circle.directions, sign, std::max(1.2, reach * circle.radius), around);
   std::vector<float> distances;
   for (int k = 0; k < circle.directions; ++k) {
     if ((open >> static_cast<unsigned>(k) & 1U) == 0) continue;
-    const auto [cosine, sine] = direction_of(k, circle.directions);
-    const Met met = look_along(edges, circle, cosine, sine, sign, std::max(1.2, reach * circle.radius));
+    const Met& met = around[static_cast<std::size_t>(k)];
     if (met.edge && met.in_view) distances.push_back(static_cast<float>(circle.radius + met.offset));
   }
   if (static_cast<int>(distances.size()) < fewest) return 0;

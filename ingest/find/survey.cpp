@@ -12,6 +12,7 @@
 #include "ingest/find/circle_census.hpp"
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/edge_map.hpp"
+#include "ingest/find/nearby.hpp"
 #include "ingest/find/packed_bed.hpp"
 #include "ingest/find/picture_maps.hpp"
 #include "ingest/find/rim_probability.hpp"
@@ -286,7 +287,7 @@ bool leaves_room(const SurveyCandidate& candidate, int reduction) {
   return touching && *touching > room * candidate.rims.open_radius_px && *touching <= largest_packed_px * reduction;
 }
 
-// Radii at which the circles of the census would touch, those of the best hypotheses first; last, none.
+// Radii at which the circles of the census would touch, those of the best hypotheses first.
 std::vector<PackedStart> starts_from(const CircleCensus& census, const SurveyOptions& options, int reduction) {
   constexpr std::size_t most_starts = 2;
   constexpr double another = 1.08;
@@ -301,7 +302,6 @@ std::vector<PackedStart> starts_from(const CircleCensus& census, const SurveyOpt
         }))
       starts.push_back({hypothesis.polarity, radius});
   }
-  starts.push_back({options.polarity, std::nullopt});
   return starts;
 }
 
@@ -313,8 +313,10 @@ struct SurveyedPicture {
 };
 
 // Beads that lie close, by their faces, come first where they explain more than circles do.
-void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const std::vector<PackedStart>& starts,
+void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const CircleCensus& census,
                          const SurveyOptions& options) {
+  std::vector<PackedStart> starts = starts_from(census, options, picture.reduction);
+  if (!survey.found && !options.radius_px) starts.push_back({options.polarity, std::nullopt});
   const std::optional<PackedBed> bed = look_for_packed_bed(picture.frame, starts);
   if (!bed) return;
   SurveyCandidate candidate = candidate_of(*bed, picture.frame);
@@ -452,15 +454,51 @@ void settle_credibility(SurveyCandidate& candidate, int reduction, const SurveyO
   }
 }
 
-// Whether a candidate is the beads of a hypothesis: credible, and of a radius from which the search would end there. Of
-// few circles, or of several sizes, the search may end elsewhere.
+// Share of the circles of a hypothesis that lie on or in the disks of a candidate, about the same centres: the same
+// beads, their highlights or rings in them.
+double share_within(const std::vector<RimDisk>& disks, const CircleHypothesis& hypothesis, int reduction) {
+  constexpr double same_place = 0.3, most_of_its_radius = 1.12;  // radii; as in a search for beads of one kind
+  const double radius = hypothesis.radius_px * reduction;
+  const Nearby near(disks.size(), same_place * radius,
+                    [&](std::size_t i) { return std::pair(disks[i].circle.x, disks[i].circle.y); });
+  double among = 0;
+  for (const Circle& circle : hypothesis.seen) {
+    const double shift = 0.5 * (reduction - 1);
+    const double x = reduction * circle.x + shift, y = reduction * circle.y + shift, its = reduction * circle.radius;
+    among += near.any_near(x, y, [&](std::size_t i) {
+      const Circle& disk = disks[i].circle;
+      return its < most_of_its_radius * disk.radius;
+    });
+  }
+  return among / std::max(1.0, static_cast<double>(hypothesis.seen.size()));
+}
+
+// Whether a candidate is the beads of a hypothesis: credible, and of a radius from which the search would end there, or
+// with its circles on those disks. Of few circles, or of several sizes, the search may end elsewhere.
 bool is_known(const Survey& survey, const CircleHypothesis& hypothesis, Channel channel, int reduction) {
-  constexpr double searched_around = 1.07;
+  constexpr double searched_around = 1.07, nearly_all = 0.9;
   return std::any_of(survey.candidates.begin(), survey.candidates.end(), [&](const SurveyCandidate& known) {
     const double ratio = hypothesis.radius_px * reduction / known.rims.radius_px;
     return known.credible && !known.region && std::ssize(known.disks) >= fewest_in_part && known.channel == channel &&
-           known.rims.polarity == hypothesis.polarity && std::max(ratio, 1 / ratio) < searched_around;
+           known.rims.polarity == hypothesis.polarity &&
+           (std::max(ratio, 1 / ratio) < searched_around ||
+            share_within(known.disks, hypothesis, reduction) >= nearly_all);
   });
+}
+
+// Whether beads make up the picture, so that other channels would show the same. Where one shows more of them, or
+// shows them better, settle_channel() finds out.
+bool shows_beads_plainly(const Survey& survey) {
+  constexpr double most_of_all_edges = 0.5, hardly_wrong = 0.02;
+  return std::any_of(survey.candidates.begin(), survey.candidates.end(), [&](const SurveyCandidate& one) {
+    return one.credible && !one.region && std::ssize(one.disks) >= fewest_in_part &&
+           one.explained_share >= most_of_all_edges && one.expected_wrong <= hardly_wrong;
+  });
+}
+bool may_show_beads_plainly(const CircleCensus& census) {
+  constexpr double hardly_by_chance = 0.02;
+  return !census.hypotheses.empty() && census.hypotheses.front().circles >= static_cast<double>(fewest_in_part) &&
+         census.hypotheses.front().by_chance <= hardly_by_chance * census.hypotheses.front().circles;
 }
 
 enum class Effort { full, glance };
@@ -499,6 +537,21 @@ void examine(const CircleCensus& census, const SearchedChannels& in, const Surve
   }
 }
 
+// The census of the channels that were searched, and what its hypotheses came to: of the first channel, and of the
+// others where that one does not show beads plainly.
+CircleCensus examine_channels(const SearchedChannels& in, const CensusOptions& options, const SurveyAsked& asked,
+                              std::size_t most, Survey& survey) {
+  CircleCensus census = census_of(*in.pictures.front(), 0, options);
+  const bool first_alone = in.pictures.size() == 1;
+  if (first_alone || may_show_beads_plainly(census)) examine(census, in, asked, most, survey);
+  if (first_alone || shows_beads_plainly(survey)) return census;
+  survey.candidates.clear();
+  for (std::size_t channel = 1; channel < in.pictures.size(); ++channel)
+    add_census(census_of(*in.pictures[channel], channel, options), census);
+  examine(census, in, asked, most, survey);
+  return census;
+}
+
 Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, Effort effort) {
   Survey survey;
   const SearchedChannels in = channels_to_search(frames, options, effort);
@@ -508,10 +561,10 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
   asked.polarity = options.polarity;
   const DrawingSigns signs = signs_inside(frames, options.roi);
   if (options.radius_px) asked.radius_px = *options.radius_px / frames.reduction;
-  const CircleCensus census = take_census(pictures, asked);
   const SurveyAsked asked_of_each{
       options, signs, largest_proposed * std::min(frames.width, frames.height) / frames.reduction, frames.reduction};
-  examine(census, in, asked_of_each, effort == Effort::full ? most_examined : most_examined_in_parts, survey);
+  const CircleCensus census = examine_channels(in, asked, asked_of_each,
+                                               effort == Effort::full ? most_examined : most_examined_in_parts, survey);
   if (!options.any_shape) compare_with_smaller(survey.candidates);
   std::stable_sort(survey.candidates.begin(), survey.candidates.end(),
                    [](const SurveyCandidate& a, const SurveyCandidate& b) {
@@ -524,7 +577,7 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
       (!survey.candidates.front().region && leaves_room(survey.candidates.front(), frames.reduction))) {
     const std::size_t channel = census.hypotheses.empty() ? 0 : census.hypotheses.front().channel;
     SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs};
-    consider_packed_bed(survey, picture, starts_from(census, options, frames.reduction), options);
+    consider_packed_bed(survey, picture, census, options);
   }
   if (survey.found) {
     SurveyOptions in_region = options;

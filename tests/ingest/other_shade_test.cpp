@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/profile/photographs.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/by_hand.hpp"
 
@@ -62,6 +65,24 @@ TEST(OtherShade, IsLookedForInThePolarityAskedFor) {
   bright_alone.polarity = Polarity::bright_beads, dark_alone.polarity = Polarity::dark_beads;
   EXPECT_EQ(with_second_shade(bed, dark, bright_alone), 20U);
   EXPECT_EQ(with_second_shade(bed, dark, dark_alone), 14U);
+}
+
+// With nothing known of the picture.
+TEST(OtherShade, SmallBrightBeadsAreFoundBetweenDarkOnes) {
+  const BedOfShades bed(6, 7, 210);
+  const DisksFound found = find_disks(ImageView{
+      .width = bed.frame.width, .height = bed.frame.height, .pixels = bed.frame.pixels.data(), .type = PixelType::f32});
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.disks.size(), 20U);
+  const auto beads_of = [&](const std::vector<RenderedDisk>& shade, double sign) {
+    return std::count_if(shade.begin(), shade.end(), [&](const RenderedDisk& bead) {
+      return std::any_of(found.disks.begin(), found.disks.end(), [&](const FoundDisk& disk) {
+        return std::hypot(disk.x_px - bead.x_px, disk.y_px - bead.y_px) < 1 && sign * disk.contrast > 0;
+      });
+    });
+  };
+  EXPECT_EQ(beads_of(bed.dark, 1), 14);
+  EXPECT_EQ(beads_of(bed.bright, -1), 6);
 }
 
 TEST(OtherShade, IsNotLookedForWithoutBeadsRimsOrPixelsOfTheirOwn) {

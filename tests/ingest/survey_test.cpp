@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -253,6 +254,45 @@ TEST(Survey, ALargerOutlineWinsOverTheHighlightInIt) {
     return std::hypot(x - bead->x + 3, y - bead->y + 3) < 6 ? 240.0 : 70.0;
   });
   expect_all(survey_of({{Channel::automatic, frame}}), truth, radius);
+}
+
+// In a second channel the same beads are faint. They are searched for there, too, where the first shows other things
+// as well: a ruled ground.
+TEST(Survey, OneChannelIsEnoughWhereItShowsBeadsPlainly) {
+  const double radius = 9;
+  const std::vector<Place> truth = scattered(60, 2.3 * radius, 380, 340, 12);
+  const BeadAt bead_at(truth, radius);
+  const auto surveyed = [&](bool ruled) {
+    const GrayFrame plain = painted(380, 340, [&](double x, double y) {
+      if (bead_at(x, y) != nullptr) return 60.0;
+      return ruled && std::fmod(x + 0.3 * y, 14) < 5 ? 220.0 : 180.0;
+    });
+    const GrayFrame faint = painted(
+        380, 340, [&](double x, double y) { return bead_at(x, y) == nullptr ? 100.0 : 116.0; }, 2);
+    return survey_of({{Channel::red, plain}, {Channel::blue, faint}});
+  };
+  const auto in_blue = [](const Survey& survey) {
+    return std::count_if(survey.candidates.begin(), survey.candidates.end(),
+                         [](const SurveyCandidate& one) { return one.channel == Channel::blue; });
+  };
+  const Survey plainly = surveyed(false);
+  expect_all(plainly, truth, radius);
+  EXPECT_EQ(in_blue(plainly), 0);
+  EXPECT_GE(in_blue(surveyed(true)), 1);
+}
+
+// Rings of 0.75 radii in the beads are seen as well as the beads.
+TEST(Survey, RingsInBeadsAreNoFurtherCandidates) {
+  const double radius = 16;
+  const std::vector<Place> truth = scattered(60, 2.2 * radius, 560, 480, 14);
+  const BeadAt bead_at(truth, radius);
+  const Survey survey = survey_of({{Channel::automatic, painted(560, 480, [&](double x, double y) {
+                                      const Place* bead = bead_at(x, y);
+                                      if (bead == nullptr) return 180.0;
+                                      return std::hypot(x - bead->x, y - bead->y) < 0.75 * radius ? 60.0 : 110.0;
+                                    })}});
+  expect_all(survey, truth, radius);
+  EXPECT_EQ(survey.candidates.size(), 1U);
 }
 
 // Beads of 10 and of 20 px. The radius that is given decides which are meant; one that no bead has finds none.
