@@ -43,11 +43,7 @@ TEST(Answer, TakesInWhatItsModelIsKnownToMiss) {
 // Welch's degrees of freedom: those of the statistical part over its fourth power.
 TEST(Answer, HasStudentsIntervalOfAPartOfItsUncertainty) {
   AnswerInput input = column(1.0, 0.02);
-  const std::size_t n = input.profile.height.size();
-  input.profile.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i)
-    input.profile.covariance[i * n + i] = input.profile.std_error[i] * input.profile.std_error[i];
-  input.profile.covariance_samples = 5;
+  synthetic::take_errors_for_covariance(input.profile, 5);
   const Answer few = find_answer(input);
   ASSERT_TRUE(few.ok());
   const double part = std::hypot(few.statistical_error, few.misfit_error) / few.std_error;

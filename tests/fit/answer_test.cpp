@@ -206,11 +206,7 @@ TEST(Answer, TakesTheKnownBiasOff) {
 // Few samples behind the errors widen the interval as Student's t does.
 TEST(Answer, WidensItsIntervalWhereTheErrorsComeFromFewSamples) {
   AnswerInput input = column(1.0, 0.1);
-  const std::size_t n = input.profile.height.size();
-  input.profile.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i)
-    input.profile.covariance[i * n + i] = input.profile.std_error[i] * input.profile.std_error[i];
-  input.profile.covariance_samples = 5;
+  synthetic::take_errors_for_covariance(input.profile, 5);
   const Answer few = find_answer(input);
   ASSERT_TRUE(few.ok());
   const double factor = std::log(few.interval.high / few.temperature) * few.temperature / few.std_error;

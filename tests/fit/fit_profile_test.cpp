@@ -264,11 +264,8 @@ TEST(FitProfile, StatesWhatUncertainWeightsAddToErrors) {
   double bins = 0;
   for (const Residual& residual : plain.residuals) bins += residual.used;
   const double dof = plain.dof, parameters = bins - dof;
-  const std::size_t n = data.height.size();
-  data.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
   for (const int samples : {60, 100, 1000}) {
-    data.covariance_samples = samples;
+    synthetic::take_errors_for_covariance(data, samples);
     const FitResult weighed = fit_profile(data, options);
     ASSERT_EQ(weighed.status, FitStatus::ok);
     const double ns = samples, v = ns - 1;
@@ -292,14 +289,9 @@ TEST(FitProfile, TellsTheNoiseInTFromWhatTheModelMisses) {
     double mean = 0.0;
     for (int trial = 0; trial < trials; ++trial) {
       Profile data = profile_of(truth, {}, 60, top_of(truth), 0.005, 3000 + static_cast<std::uint64_t>(trial));
-      const std::size_t n = data.height.size();
-      for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t i = 0; i < data.height.size(); ++i)
         data.number_density[i] += 0.02 * std::sin(2.0 * data.height[i]) * std::min(1.0, 5.0 * data.number_density[i]);
-      if (covariance) {
-        data.covariance.assign(n * n, 0.0);
-        for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
-        data.covariance_samples = 5000;
-      }
+      if (covariance) synthetic::take_errors_for_covariance(data, 5000);
       FitOptions options = core_options(1.10);
       options.interval = true;
       options.window.low = 1.0;

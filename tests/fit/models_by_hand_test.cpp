@@ -232,13 +232,10 @@ TEST(FitNumbersByHand, HaveTheIntervalOfTheirLikelihood) {
 TEST(FitNumbersByHand, HaveTheChanceOfSnedecorsF) {
   const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
   Profile data = synthetic::profile_of(truth, {}, 30, 16, 0.02, 4);
-  const std::size_t n = data.height.size();
-  data.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
   FitOptions options;
   options.plateau_density = 1.10, options.sweep = options.compare = options.interval = false;
   for (const int samples : {60, 200}) {
-    data.covariance_samples = samples;
+    synthetic::take_errors_for_covariance(data, samples);
     const FitResult fit = fit_profile(data, options);
     ASSERT_TRUE(fit.ok());
     // aic is this chi2 and twice the two parameters: so many degrees of freedom it counts as.
@@ -251,10 +248,7 @@ TEST(FitNumbersByHand, HaveTheChanceOfSnedecorsF) {
 TEST(FitNumbersByHand, HaveStudentsIntervalsOfFewSamples) {
   const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
   Profile data = synthetic::profile_of(truth, {}, 60, 16, 0.02, 4);
-  const std::size_t n = data.height.size();
-  data.covariance.assign(n * n, 0.0);
-  for (std::size_t i = 0; i < n; ++i) data.covariance[i * n + i] = data.std_error[i] * data.std_error[i];
-  data.covariance_samples = 12;
+  synthetic::take_errors_for_covariance(data, 12);
   FitOptions options;
   options.plateau_density = 1.10, options.sweep = options.compare = false;
   options.model_error = false;

@@ -12,15 +12,19 @@
 namespace shakebed::fit {
 namespace {
 
+// A density of 0.7 per D^2 with errors of 0.1, at so many heights from `first` on [D].
+Profile flat(int count, double first, double spacing) {
+  Profile profile;
+  for (int i = 0; i < count; ++i) profile.height.push_back(first + spacing * i);
+  profile.number_density.assign(profile.height.size(), 0.7);
+  profile.std_error.assign(profile.height.size(), 0.1);
+  return profile;
+}
+
 TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
   // White noise of 0.1 every 0.1 D on a flat density of 0.7, at points. Blurred by 0.5 D its variance is that times
   // 0.1/(2 sqrt(pi) 0.5), and neighbours d apart are correlated by exp(-d^2/(4 0.25)).
-  Profile profile;
-  for (int i = 0; i < 200; ++i) {
-    profile.height.push_back(0.05 + 0.1 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
+  const Profile profile = flat(200, 0.05, 0.1);
   const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
   EXPECT_EQ(blurred.kernel.kind, KernelKind::gaussian);
   EXPECT_EQ(blurred.kernel.width, 0.5);
@@ -36,12 +40,7 @@ TEST(RowBlur, GivesTheKernelAndTheErrorsOfWhatItMadeOfTheProfile) {
 // What a kernel lacks of the variance 0.25 D^2 is blurred into the profile, whatever its form; and what it leaves of a
 // crystal's rows is its Fourier transform at their distance. Both are integrals over the kernel, summed here.
 TEST(RowBlur, GoesByTheMomentsOfTheKernel) {
-  Profile profile;
-  for (int i = 0; i < 200; ++i) {
-    profile.height.push_back(0.05 + 0.1 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
+  const Profile profile = flat(200, 0.05, 0.1);
   Profile bare = profile;  // without errors it is left as it is
   bare.std_error.clear();
   for (const Kernel& kernel : {Kernel{KernelKind::gaussian, 0.2}, Kernel{KernelKind::top_hat, 1.0},
@@ -63,12 +62,7 @@ TEST(RowBlur, GoesByTheMomentsOfTheKernel) {
 }
 
 TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
-  Profile profile;
-  for (int i = 0; i < 50; ++i) {
-    profile.height.push_back(0.25 * i);
-    profile.number_density.push_back(0.7);
-    profile.std_error.push_back(0.1);
-  }
+  const Profile profile = flat(50, 0, 0.25);
   const Kernel wide{KernelKind::gaussian, 0.5};
   EXPECT_EQ(blur_rows(profile, wide, 0.0).profile.number_density, profile.number_density);
   EXPECT_EQ(blur_rows(profile, wide, 0.0).kernel.width, 0.5);

@@ -42,6 +42,14 @@ inline Profile profile_of(const HydrostaticProfile& truth, const Kernel& kernel,
   return profile;
 }
 
+// A covariance of its errors alone, as if `samples` had given it.
+inline void take_errors_for_covariance(Profile& profile, int samples) {
+  const std::size_t n = profile.height.size();
+  profile.covariance.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) profile.covariance[i * n + i] = profile.std_error[i] * profile.std_error[i];
+  profile.covariance_samples = samples;
+}
+
 // The height above which next to nothing is left.
 inline double top_of(const HydrostaticProfile& truth) {
   double height = truth.top_of_solid();
