@@ -112,17 +112,18 @@ int fit_some_images(const Call& call, const FitImagesArguments& image) {
     throw UsageError("--budget: velocities need successive frames, so it cannot be combined with --frame-rate");
   Console console(level_of(call));
   FitImagesArguments some = image;
-  const auto plan = [&some](std::uint64_t stride) {
-    some.stride = stride;
+  const auto plan = [&some](std::uint64_t stride, std::optional<std::uint64_t> reduction) {
+    some.stride = stride, some.reduction = reduction;
     return plan_of(recipe_of(some), some);
   };
   install_interrupt_handler();
-  const fs::path out = out_of(call, plan(1).name);
+  const fs::path out = out_of(call, plan(1, {}).name);
   const BudgetedFrames chosen =
       frames_by_budget({parse_budget(*image.budget), image.files, out, image.run.jobs, image.run.force, plan}, console);
   some.run.chosen = chosen.record;
   Json answer;
-  const int code = run_plan_command(call, some.run, plan(chosen.stride), console, call.json ? &answer : nullptr);
+  const int code =
+      run_plan_command(call, some.run, plan(chosen.stride, chosen.reduction), console, call.json ? &answer : nullptr);
   if (code == exit_ok && !image.run.dry_run) say_reached_by_frames(out, chosen.record, console);
   if (call.json) print(dump(answer));
   return code;
@@ -167,7 +168,8 @@ void add_fit_images(Program& program) {
   command
       .add_option("--budget", given->budget,
                   "wanted statistical error of T (\"1 %\") or wanted wall time (\"30 s\"). A short pilot run then "
-                  "chooses how many of the frames are measured. With --dry-run only the pilot runs")
+                  "chooses how many of the frames are measured, and whether pixels are averaged. With --dry-run only "
+                  "the pilot runs")
       ->type_name("ERROR|TIME");
   add_bed_options(command, *given);
   add_film_options(command, *given);

@@ -21,22 +21,29 @@ namespace {
 constexpr std::uint64_t few_frames = 4, pilot_frames = 16;
 constexpr double time_to_spare = 0.95;
 
-// The error of few frames is uncertain itself: of 16 by a fifth.
-constexpr double miss_factor = 1.2;
+// What a run found out.
+struct Found {
+  std::optional<double> temperature, error;  // the error is that of T over T; nothing where the fit has none
+  double radius_px = 0;
+  std::uint64_t reduction = 1;
+};
 
-// The statistical error of T over T; nothing where the fit gives no temperature.
-std::optional<double> fitted_error(const fs::path& out) {
+Found found_below(const fs::path& out) {
+  Found found;
+  if (const fs::path file = out / "extract" / "extract.json"; fs::exists(file)) {
+    const Json extract = parse_own_json(read_file(file));
+    found.radius_px = extract.at("radius").at("value").get<double>();
+    found.reduction = extract.at("reduction").get<std::uint64_t>();
+  }
   const fs::path file = out / "fit" / "fit.json";
-  if (!fs::exists(file)) return std::nullopt;
+  if (!fs::exists(file)) return found;
   const Json fit = parse_own_json(read_file(file));
   const Json *t = find_pointer(fit, "/temperature/value"), *error = find_pointer(fit, "/statistical_error/value");
-  if (t == nullptr || error == nullptr || !t->is_number() || !error->is_number()) return std::nullopt;
-  const double relative = error->get<double>() / t->get<double>();
-  if (!(relative > 0)) return std::nullopt;
-  return relative;
+  if (t == nullptr || error == nullptr || !t->is_number() || !error->is_number()) return found;
+  found.temperature = t->get<double>();
+  if (const double relative = error->get<double>() / *found.temperature; relative > 0) found.error = relative;
+  return found;
 }
-
-std::string per_cent(double relative) { return fmt::format("{:.2g} %", 100 * relative); }
 
 class FrameBudget {
  public:
@@ -46,18 +53,20 @@ class FrameBudget {
     const std::uint64_t all = images_module().count_frames(request_.files);
     if (all <= pilot_frames) {
       console_.message(fmt::format("--budget \"{}\": all {} frames are measured", request_.budget.text, all));
-      return {1, record_of({1, all, 0, 0, true}, {}, all)};
+      return {1, {}, record_of({1, all, 0, 0, true}, {}, all)};
     }
     FramePilot pilot;
-    const Run few = run_pilot(all, few_frames), more = run_pilot(all, pilot_frames);
+    const Run few = run_pilot(all, few_frames, {}), more = run_pilot(all, pilot_frames, {});
     pilot.frames = more.frames;
-    if (const auto error = fitted_error(more.out)) pilot.error = *error;
+    pilot.error = more.found.error.value_or(0);
     cost_of_frames(few.frames, few.seconds, more.frames, more.seconds, pilot);
-    Budget left = request_.budget;
-    left.seconds = std::max(0.0, time_to_spare * left.seconds - few.seconds - more.seconds);
-    const FrameChoice choice = choose_frames(pilot, all, left);
-    say(choice, pilot, all, few.seconds + more.seconds);
-    return {choice.stride, record_of(choice, pilot, all)};
+    spent_ = few.seconds + more.seconds;
+    FrameChoice choice = choose_frames(pilot, all, left());
+    if (coarser_may_gain(choice, all, left())) try_coarser(more, all, pilot, choice);
+    say(choice, pilot, all);
+    std::optional<std::uint64_t> reduction;
+    if (coarser_) reduction = coarser_->reduction;
+    return {choice.stride, reduction, record_of(choice, pilot, all)};
   }
 
  private:
@@ -65,12 +74,52 @@ class FrameBudget {
     fs::path out;
     std::uint64_t frames = 0;
     double seconds = 0;
+    Found found;
+  };
+  struct Coarser {
+    std::uint64_t reduction;
+    double shift;  // of T, over T
   };
 
-  Run run_pilot(std::uint64_t all, std::uint64_t frames) {
+  Budget left() const {
+    Budget left = request_.budget;
+    left.seconds = std::max(0.0, time_to_spare * left.seconds - spent_);
+    return left;
+  }
+
+  // The same frames from fewer pixels. Where these are better, pilot and choice become theirs.
+  void try_coarser(const Run& fine, std::uint64_t all, FramePilot& pilot, FrameChoice& choice) {
+    const std::uint64_t reduction = coarsest_reduction(fine.found.radius_px, fine.found.reduction);
+    if (reduction == fine.found.reduction || !fine.found.temperature) return;
+    const std::optional<Run> coarse = run_if_possible(all, reduction);
+    if (!coarse || !coarse->found.error) return;
+    spent_ += coarse->seconds;
+    if (coarse->found.reduction != reduction) return;  // a change of --set decides
+    FramePilot its = pilot;
+    its.error = *coarse->found.error;
+    its.fixed_seconds = std::min(pilot.fixed_seconds, coarse->seconds);
+    its.seconds_per_frame = (coarse->seconds - its.fixed_seconds) / static_cast<double>(coarse->frames);
+    const double shift = std::abs(*coarse->found.temperature / *fine.found.temperature - 1);
+    const FrameChoice chosen = choose_frames(its, all, left());
+    choice = choose_frames(pilot, all, left());
+    if (!coarser_is_better(choice, chosen, shift, request_.budget)) return;
+    pilot = its, choice = chosen, coarser_ = Coarser{reduction, shift};
+  }
+
+  // Nothing where the beads are not seen by so few pixels.
+  std::optional<Run> run_if_possible(std::uint64_t all, std::uint64_t reduction) {
+    try {
+      return run_pilot(all, pilot_frames, reduction);
+    } catch (const StageError&) {
+      return std::nullopt;
+    }
+  }
+
+  Run run_pilot(std::uint64_t all, std::uint64_t frames, std::optional<std::uint64_t> reduction) {
     const std::uint64_t stride = all / frames;
-    const Plan plan = request_.plan(stride);
-    Run run{request_.out / ".pilot" / fmt::format("every-{}", stride), (all + stride - 1) / stride, 0};
+    const Plan plan = request_.plan(stride, reduction);
+    const std::string name = fmt::format("every-{}", stride) + (reduction ? fmt::format("-by-{}", *reduction) : "");
+    Run run{request_.out / ".pilot" / name, (all + stride - 1) / stride, 0, {}};
     RunOptions options;
     options.out = run.out;
     options.until = "fit";
@@ -90,20 +139,26 @@ class FrameBudget {
           fmt::format("the pilot run of --budget, with {} of {} frames, failed: {}", run.frames, all, outcome.error));
     for (const StageOutcome& stage : outcome.stages)
       if (stage.cost) run.seconds += stage.cost->wall_seconds;
+    run.found = found_below(run.out);
     return run;
   }
 
-  void say(const FrameChoice& choice, const FramePilot& pilot, std::uint64_t all, double pilot_seconds) const {
+  void say(const FrameChoice& choice, const FramePilot& pilot, std::uint64_t all) const {
     const Budget& budget = request_.budget;
     if (budget.seconds > 0 && !choice.possible)
       throw StageError(fmt::format("--budget {}: one frame needs about {}, and the pilot run took {}. Allow more time",
                                    budget.text, duration_text(pilot.fixed_seconds + pilot.seconds_per_frame),
-                                   duration_text(pilot_seconds)));
+                                   duration_text(spent_)));
     console_.message(fmt::format("--budget \"{}\" chooses {} of {} frames (\"stride\": {})", budget.text, choice.frames,
                                  all, choice.stride));
+    if (coarser_)
+      console_.message(
+          fmt::format("--budget \"{}\" averages them over squares of {} px (\"reduction\": {}). On the "
+                      "frames of the pilot run this changes T by {}",
+                      budget.text, coarser_->reduction, coarser_->reduction, per_cent(coarser_->shift)));
     console_.message(fmt::format("expected statistical error of T: {}. Expected time: {}. The pilot run took {}",
                                  choice.error > 0 ? per_cent(choice.error) : "unknown", duration_text(choice.seconds),
-                                 duration_text(pilot_seconds)));
+                                 duration_text(spent_)));
     if (choice.possible || budget.seconds > 0) return;
     if (pilot.error > 0)
       console_.warning(
@@ -123,12 +178,15 @@ class FrameBudget {
       frames["wall_seconds"] = choice.seconds;
       frames["possible"] = choice.possible;
       frames["pilot"] = Json{{"frames", pilot.frames}, {"error", pilot.error}};
+      if (coarser_) frames["reduction"] = coarser_->reduction, frames["effect_of_reduction"] = coarser_->shift;
     }
     return Json{{"asked", request_.budget.text}, {"frames", std::move(frames)}, {"stages", Json::array()}};
   }
 
   const FrameBudgetRequest& request_;
   Console& console_;
+  double spent_ = 0;  // wall time of the pilots [s]
+  std::optional<Coarser> coarser_;
 };
 
 }  // namespace
@@ -138,19 +196,11 @@ BudgetedFrames frames_by_budget(const FrameBudgetRequest& request, Console& cons
 }
 
 void say_reached_by_frames(const fs::path& out, const Json& record, Console& console) {
-  const auto reached = fitted_error(out);
-  if (!reached) return;
-  const Budget asked = parse_budget(record.at("asked").get<std::string>());
-  const Json& frames = record.at("frames");
-  console.message(fmt::format("statistical error of T: {}, from {} of {} frames", per_cent(*reached),
-                              frames.at("measured").get<std::uint64_t>(), frames.at("of").get<std::uint64_t>()));
-  const auto stride = frames.at("stride").get<std::uint64_t>();
-  if (!(asked.error > 0) || stride == 1 || *reached <= miss_factor * asked.error) return;
-  const double smaller = static_cast<double>(stride) * std::pow(asked.error / *reached, 2);
-  console.warning(fmt::format(
-      "the statistical error of T is {}, more than the wanted {}: its first estimate, from a few frames, was "
-      "too small. More frames reduce it: --set /stages/extract/stride={} in place of --budget",
-      per_cent(*reached), asked.text, static_cast<std::uint64_t>(std::max(1.0, smaller))));
+  const auto error = found_below(out).error;
+  if (!error) return;
+  const ReachedByFrames reached = reached_by_frames(*error, record);
+  console.message(reached.message);
+  if (!reached.warning.empty()) console.warning(reached.warning);
 }
 
 }  // namespace shakebed::pipelines

@@ -21,12 +21,15 @@ struct FrameBudgetRequest {
   std::filesystem::path out;  // of the run; pilots are below OUT/.pilot
   int jobs = 0;
   bool force = false;
-  std::function<Plan(std::uint64_t stride)> plan;  // whose stages `extract` and `fit` measure every so many frames
+  // Whose stages `extract` and `fit` measure every so many frames, averaged over squares of so many pixels, if
+  // that is given.
+  std::function<Plan(std::uint64_t stride, std::optional<std::uint64_t> reduction)> plan;
 };
 
 struct BudgetedFrames {
   std::uint64_t stride = 1;
-  Json record;  // for the manifest
+  std::optional<std::uint64_t> reduction;  // where frames are averaged more than they are without a budget
+  Json record;                             // for the manifest
 };
 
 // Runs the pilots and says what is chosen and expected. What is there from an earlier call is not run again. Few frames

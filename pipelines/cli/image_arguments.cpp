@@ -72,7 +72,7 @@ Json extract_stage(const ImageArguments& image) {
   give("shape", image.shape);
   give("second_diameter", image.second_diameter), give("gravity", image.gravity);
   give("pixel_aspect", image.pixel_aspect), give("lens", image.lens), give("bead_number", image.bead_number);
-  give("stride", image.stride);
+  give("stride", image.stride), give("reduction", image.reduction);
   if (image.kernel) stage["kernel"] = kernel_json(*image.kernel);
   give("frame_rate", image.frame_rate);
   if (image.frame_rate) give("frequency", image.frequency);

@@ -182,6 +182,8 @@ class Chooser {
 
 }  // namespace
 
+std::string per_cent(double relative) { return fmt::format("{:.2g} %", 100 * relative); }
+
 Budget parse_budget(const std::string& text) {
   const auto refuse = [&](const std::string& what) {
     throw UsageError(fmt::format(
@@ -261,8 +263,6 @@ namespace {
 int threads_of(const RunOptions& options) {
   return options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
-
-std::string per_cent(double relative) { return fmt::format("{:.2g} %", 100 * relative); }
 
 std::string changes_text(const Scalable::Changes& changes) {
   std::vector<std::string> parts;

@@ -95,6 +95,10 @@ void describe_frames(Fields& fields, ExtractOptions& o) {
   fields.integer(
       "stride", o.stride,
       {.help = "step between the frames that are used: 1 for all, 2 for every second one", .range = at_least(1)});
+  fields.integer("reduction", o.reduction,
+                 {.help = "side of the squares of pixels over which frames are averaged before the measurement; "
+                          "default: 1, and more where beads are wide and frames large",
+                  .range = from_to(1, 100)});
   fields.integer(
       "overlays", o.overlays,
       {.help = "number of frames of which a picture with the disks found is written", .range = from_to(0, 1000)});

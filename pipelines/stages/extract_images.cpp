@@ -57,6 +57,17 @@ std::string advice(const ExtractOptions& options, RunContext& context, const Fir
   throw StageError(fmt::format("{}. {}", what, advice(options, context, look, proposals)));
 }
 
+// Throws StageError where frames reduced so far show too little of a bead.
+void require_visible(std::uint64_t reduction, double radius_px, const std::string& path) {
+  const double left = radius_px / static_cast<double>(reduction);
+  if (left >= ingest::least_reduced_radius_px) return;
+  throw StageError(fmt::format(
+      "{}: averaged over squares of {} px (reduction), a bead of {:.3g} px radius is left with {:.2g} px; {:g} px are "
+      "needed. Give at most {}",
+      path, reduction, radius_px, left, ingest::least_reduced_radius_px,
+      std::max(1, static_cast<int>(radius_px / ingest::least_reduced_radius_px))));
+}
+
 // The beads the first frame shows: channel, radius and polarity to go on with. Refuses when it shows none. Whether
 // their outlines are those of disks.
 struct UsedLook {
@@ -86,6 +97,7 @@ UsedLook use_first_look(const ExtractOptions& options, RunContext& context, Film
         fmt::format("{}: {}. The circles are measured because shape is \"any\".", look->path, chosen->why_drawn));
   if (chosen->region && !measure.find.roi) context.warning(ingest::why_only_a_part(*chosen->region));
   go_on_with(*chosen, *look, film.source, measure);
+  if (options.reduction) require_visible(*options.reduction, chosen->rims.radius_px, look->path);
   if (const std::string why = ingest::why_reduced(look->width, look->height, film.source.reduction); !why.empty())
     context.warning(why);
   context.log(fmt::format("beads of {:.2f} px radius ({}): {} in the first frame", chosen->rims.radius_px,
@@ -144,6 +156,7 @@ class Extraction {
       read_sides();
       first_look_ = use_first_look(options_, context_, film_, measure_);
     }
+    if (options_.reduction) film_.source.reduction = measure_.reduction = static_cast<int>(*options_.reduction);
     std::optional<std::ifstream> truth_file;
     if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
     DisksOnTheWay on_the_way(context_, options_, truth_file ? &*truth_file : nullptr);
@@ -176,6 +189,8 @@ class Extraction {
   // Scale, floor and walls of a render stage, unless they are to be found.
   void use_rendered() {
     const FrameGeometry geometry = FrameGeometry::read(rendered_->file("geometry.json"));
+    if (options_.reduction)
+      require_visible(*options_.reduction, options_.diameter / geometry.scale / 2, rendered_->directory.string());
     if (geometry.periodic && (!measure_.left_wall_px || *measure_.left_wall_px == geometry.left_wall))
       use_periodic_sides(geometry);
     if (options_.use_geometry) {
@@ -312,6 +327,7 @@ class Extraction {
     write_profiles(context_, found);
     frames_table(context_.table("frames.csv"), found.frames).write(context_.output("frames.csv"));
     Json result = bed_numbers(options_, found);
+    result["reduction"] = measure_.reduction;
     result["quality"] = on_the_way.quality();
     result["cut_disks"] = on_the_way.cut(), result["half_hidden_disks"] = on_the_way.half_hidden();
     add_velocities(on_the_way, result);

@@ -15,6 +15,7 @@ void state_frames(ResultList& list, const ExtractOptions& options) {
   list.number("/disks_per_frame_scatter", "1", "standard deviation of the number of disks between frames");
   list.number("/bead_number", "1", "number of beads in view, as given in the option",
               given_if(options.bead_number.has_value(), "\"bead_number\" is given"));
+  list.number("/reduction", "px", "side of the squares of pixels over which the frames were averaged");
   list.number("/cut_disks", "1", "number of disks cut by the edge of the frame");
   list.number("/half_hidden_disks", "1", "number of disks partly covered by others");
   list.number("/quality/lowest_percent", "1", "quality below which 1 % of the disks lie");

@@ -392,6 +392,46 @@ TEST(CostOfFrames, IsALineThroughTwoPilots) {
   }
 }
 
+TEST(ReducedFrames, LeaveARadiusOfSixPixels) {
+  EXPECT_EQ(coarsest_reduction(20, 1), 3U) << "6.67 px are left";
+  EXPECT_EQ(coarsest_reduction(12, 1), 2U);
+  EXPECT_EQ(coarsest_reduction(11.9, 1), 1U);
+  EXPECT_EQ(coarsest_reduction(4, 1), 1U);
+  EXPECT_EQ(coarsest_reduction(30, 8), 8U) << "frames that are reduced already";
+}
+
+TEST(ReducedFrames, AreTriedWhereManyFramesAreMeasuredOrNotAllFitIntoTheTime) {
+  EXPECT_TRUE(coarser_may_gain({.frames = 64}, 1000, error_of(0.01)));
+  EXPECT_FALSE(coarser_may_gain({.frames = 63}, 1000, error_of(0.01)));
+  const Budget time{.seconds = 10, .text = "10 s"};
+  EXPECT_TRUE(coarser_may_gain({.frames = 20}, 21, time));
+  EXPECT_FALSE(coarser_may_gain({.frames = 21}, 21, time));
+}
+
+TEST(ReducedFrames, AreChosenForAnErrorWhereTheyAreCheaperAndChangeLittle) {
+  const FrameChoice fine{.frames = 100, .error = 0.02, .seconds = 10};
+  const auto chosen = [&](double seconds, double shift) {
+    return coarser_is_better(fine, {.frames = 110, .error = 0.02, .seconds = seconds}, shift, error_of(0.02));
+  };
+  EXPECT_TRUE(chosen(7.9, 0.0019));
+  EXPECT_FALSE(chosen(8.1, 0.0019));
+  EXPECT_FALSE(chosen(7.9, 0.0021));
+  EXPECT_FALSE(coarser_is_better(fine, {.error = 0, .seconds = 1}, 0, error_of(0.02))) << "their error is unknown";
+  EXPECT_FALSE(coarser_is_better(fine, {.error = 0.03, .seconds = 1, .possible = false}, 0, error_of(0.02)))
+      << "they do not reach it";
+  EXPECT_TRUE(coarser_is_better({.error = 0.03, .seconds = 9, .possible = false},
+                                {.error = 0.03, .seconds = 1, .possible = false}, 0, error_of(0.02)))
+      << "neither does";
+}
+
+// 3 % of scatter and 4 % of shift are 5 % together.
+TEST(ReducedFrames, AreChosenForATimeWhereErrorAndShiftTogetherAreSmaller) {
+  const Budget time{.seconds = 10, .text = "10 s"};
+  const FrameChoice coarse{.frames = 100, .error = 0.03, .seconds = 10};
+  EXPECT_TRUE(coarser_is_better({.frames = 30, .error = 0.056}, coarse, 0.04, time));
+  EXPECT_FALSE(coarser_is_better({.frames = 30, .error = 0.055}, coarse, 0.04, time));
+}
+
 // ------------------------------------------------------------------------------------------------ the program
 
 // A hot, dilute bed: 40 disks, of which a second takes some ms.
@@ -543,6 +583,27 @@ TEST(BudgetReached, IsSaidBesideWhatWasExpected) {
                 "than those of the pilot. About 11 times as many beds would reach it: set \"replicas\" to 43\n");
   outcome.stages[0].record.reset();
   EXPECT_EQ(said(0.01, 0.02, "1 %"), "") << "it has not run";
+}
+
+// Of every tenth frame, (3.1/2)^2 as many reach 2 %: every fourth.
+TEST(ReachedByFrames, IsSaidWithWhatWouldReachTheError) {
+  const auto said = [](const std::string& asked, int stride, bool possible) {
+    const ReachedByFrames reached = reached_by_frames(
+        0.031, Json{{"asked", asked},
+                    {"frames", {{"stride", stride}, {"measured", 40}, {"of", 400}, {"possible", possible}}}});
+    EXPECT_EQ(reached.message, "statistical error of T: 3.1 %, from 40 of 400 frames");
+    return reached.warning;
+  };
+  const std::string missed = "the statistical error of T is 3.1 %, more than the wanted 2 %: ";
+  EXPECT_EQ(said("30 s", 10, true), "");
+  EXPECT_EQ(said("2.6 %", 10, true), "") << "within the uncertainty of an error of 16 frames, a fifth";
+  EXPECT_EQ(said("2 %", 10, true), missed +
+                                       "its first estimate, from a few frames, was too small. More frames reduce it: "
+                                       "--set /stages/extract/stride=4 in place of --budget");
+  EXPECT_EQ(said("2 %", 1, true), missed +
+                                      "successive frames are not independent, which the pilot run of frames far apart "
+                                      "does not show. All frames are measured; a longer film reduces the error");
+  EXPECT_EQ(said("2 %", 1, false), "") << "this was said before the run";
 }
 
 // A shipped figure, of which only the pilot runs.

@@ -571,4 +571,40 @@ TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
   EXPECT_THAT(velocities.err, HasSubstr("velocities need successive frames"));
 }
 
+// Beads of 12.5 px radius: averaged over squares of 2 x 2 pixels they are left 6.25.
+TEST(FrameBudget, TriesFramesOfFewerPixelsWhereManyAreMeasured) {
+  const ScratchFolder folder;
+  write_text(folder / "r.json", R"({ "name": "film", "stages": [
+    { "stage": "simulate", "id": "bed", "seed": 5, "replicas": 1, "disks": { "count": 24, "diameter": "3 mm", "restitution": 0.9 },
+      "box": { "width": "15.9 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
+      "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
+      "settle": "1 s", "measure": "8 s", "frames": { "count": 66 } },
+    { "stage": "render", "from": "bed", "scale": "0.12 mm/px", "noise": 2 } ] })");
+  ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "o"}, folder.path()).exit_code, 0);
+  const auto fit = [&](const char* out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"fit-images", "o/render/frames", "--diameter", "3 mm", "--out", out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_shakebed(arguments, folder.path());
+  };
+  const ProgramResult many = fit("many", {"--budget", "0.1 %", "--dry-run"});
+  ASSERT_EQ(many.exit_code, 0) << many.err;
+  const Json fine = read_json(folder / "many/.pilot/every-4/extract/extract.json"),
+             coarse = read_json(folder / "many/.pilot/every-4-by-2/extract/extract.json");
+  EXPECT_EQ(fine["reduction"], 1);
+  EXPECT_EQ(coarse["reduction"], 2);
+  for (const char* name : {"radius", "scale", "width", "column_number"})
+    EXPECT_NEAR(value(coarse[name]) / value(fine[name]), 1, 0.004) << name;
+  for (const char* name : {"left_wall", "right_wall", "floor"})
+    EXPECT_NEAR(value(coarse[name]), value(fine[name]), 0.25) << name << ", in pixels of the frames as they are";
+
+  // A change of --set decides.
+  const ProgramResult set = fit("set", {"--budget", "0.1 %", "--dry-run", "--set", "/stages/extract/reduction=3"});
+  ASSERT_EQ(set.exit_code, 0) << set.err;
+  EXPECT_THAT(set.err, Not(HasSubstr("averages them")));
+  const ProgramResult blind = fit("blind", {"--set", "/stages/extract/reduction=5"});
+  EXPECT_EQ(blind.exit_code, 5);
+  EXPECT_THAT(blind.err, HasSubstr("averaged over squares of 5 px (reduction), a bead of 12."));
+  EXPECT_THAT(blind.err, HasSubstr("px radius is left with 2.5 px; 3 px are needed. Give at most 4"));
+}
+
 }  // namespace
