@@ -109,7 +109,10 @@ void check_arguments(const ImageArguments& image) {
 
 Plan plan_of(const Json& recipe, const ImageArguments& image) {
   try {
-    return read_recipe_text(dump(recipe), "(command line)", fs::current_path(), changes_of(image.run));
+    Plan plan = read_recipe_text(dump(recipe), "(command line)", fs::current_path(), changes_of(image.run));
+    std::erase_if(plan.warnings, [](const Warning& one) { return one.kind == "bead"; });  // see check_arguments()
+    for (Warning& one : plan.warnings) one.problem = in_words_of_options(std::move(one.problem));
+    return plan;
   } catch (const ConfigError& error) {
     std::vector<Problem> problems;
     for (const Problem& problem : error.problems()) problems.push_back(in_words_of_options(problem));

@@ -114,6 +114,18 @@ struct ReproduceArguments {
   RunArguments run;
 };
 
+int show_results(const Call& call, const ReproduceArguments& given) {
+  if (call.json) {
+    const bool all = given.list || given.figure.empty();
+    print(dump(results_json(all ? shipped_figures() : chosen_figures(given.figure), given.list)));
+  } else {
+    print(given.list             ? results_list(shipped_figures())
+          : given.figure.empty() ? results_page(shipped_figures())
+                                 : recipe_page(chosen_figures(given.figure).front()));
+  }
+  return exit_ok;
+}
+
 }  // namespace
 
 void add_reproduce(Program& program) {
@@ -124,12 +136,7 @@ void add_reproduce(Program& program) {
                    "  shakebed reproduce clement-rajchenbach --data my-digitised-points.csv\n  shakebed reproduce "
                    "--list\n  shakebed reproduce lee-1995 --results\n  shakebed reproduce all --preset quick"},
                   [given](const Call& call) {
-                    if (given->list || given->results) {
-                      print(given->list             ? results_list(shipped_figures())
-                            : given->figure.empty() ? results_page(shipped_figures())
-                                                    : recipe_page(chosen_figures(given->figure).front()));
-                      return static_cast<int>(exit_ok);
-                    }
+                    if (given->list || given->results) return show_results(call, *given);
                     const std::vector<ShippedFigure> figures = chosen_figures(given->figure);
                     if (given->figure == "all") return run_all(call, given->run, figures);
                     return run_plan_command(call, given->run, plan_of(figures.front(), given->run));

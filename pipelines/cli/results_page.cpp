@@ -6,7 +6,6 @@
 #include <map>
 
 #include "pipelines/formats/embedded.hpp"
-#include "pipelines/formats/json.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -87,6 +86,15 @@ std::string results_list(const std::vector<ShippedRecipe>& recipes) {
           fmt::format("{}{}: {}", i > 0 ? "; " : "", claims[i].value("measured", ""), claims[i].value("verdict", ""));
     if (verdict.empty()) verdict = claims.empty() ? "no verdict on record" : counted(claims);
     out += fmt::format("{:<20} {} [{}]\n", one.name, one.title, verdict);
+  }
+  return out;
+}
+
+Json results_json(const std::vector<ShippedRecipe>& recipes, bool main_only) {
+  Json out = Json::array();
+  for (const ShippedRecipe& recipe : recipes) {
+    const ShownRecipe one = shown(recipe);
+    out.push_back(Json{{"name", one.name}, {"title", one.title}, {"claims", claims_of(one, main_only)}});
   }
   return out;
 }

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "pipelines/formats/json.hpp"
+
 namespace shakebed::pipelines {
 
 struct EmbeddedFile;
@@ -15,6 +17,8 @@ struct ShippedRecipe {
 
 // A line a recipe: name, title, verdicts of its main claims.
 std::string results_list(const std::vector<ShippedRecipe>& recipes);
+// The same for programs, with the claims as recorded: [{"name", "title", "claims"}].
+Json results_json(const std::vector<ShippedRecipe>& recipes, bool main_only);
 // docs/results.md: the main claims of all.
 std::string results_page(const std::vector<ShippedRecipe>& recipes);
 // docs/results/<recipe>.md: what was claimed, the figure, scene and findings, all claims.

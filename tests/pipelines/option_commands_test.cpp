@@ -139,6 +139,9 @@ TEST_F(ImageCommands, NameTheirOptions) {
   const auto warned = [&](const char* diameter) { return run({"fit-images", "none.png", "--diameter", diameter}).err; };
   EXPECT_THAT(warned("0.2 m"), HasSubstr("warning: --diameter: the bead has a diameter of 200 mm"));
   EXPECT_THAT(warned("3 mm"), Not(HasSubstr("--diameter")));
+  const std::string said = run(with({}, "0.2 m")).err;
+  EXPECT_THAT(said, HasSubstr("a diameter of 200 mm"));
+  EXPECT_EQ(said.find("a diameter of 200 mm"), said.rfind("a diameter of 200 mm")) << "once";
   EXPECT_EQ(refused(with({"--scale", "3"})), "--scale: \"3\" has no unit. Write \"3 mm/px\"");
   EXPECT_EQ(refused(with({"--scale", "0 mm/px"})), "--scale: must be above 0, got 0");
   EXPECT_THAT(refused(with({"--second-diameter", "4"})), HasSubstr("--second-diameter: \"4\" has no unit"));

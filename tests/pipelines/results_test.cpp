@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "pipelines/formats/json.hpp"
@@ -73,6 +74,29 @@ TEST(ResultsOfRecord, AreListedALineARecipe) {
   }
   EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), lines);
   EXPECT_EQ(run_shakebed({"reproduce", "--list", "--results"}, source).exit_code, 2);
+}
+
+TEST(ResultsOfRecord, AreJsonForPrograms) {
+  const Json record = read_json(source / "docs/results/lee-1995.json")["claims"];
+  const auto json = [](const std::vector<std::string>& arguments) {
+    const ProgramResult ran = run_shakebed(arguments, source);
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    return Json::parse(ran.out);
+  };
+  const Json one = json({"reproduce", "lee-1995", "--results", "--json"});
+  ASSERT_EQ(one.size(), 1U);
+  EXPECT_EQ(one[0]["name"], "lee-1995");
+  EXPECT_EQ(one[0]["claims"], record) << "all of them";
+  const Json listed = json({"reproduce", "--list", "--json"});
+  const auto found =
+      std::find_if(listed.begin(), listed.end(), [](const Json& entry) { return entry["name"] == "lee-1995"; });
+  ASSERT_NE(found, listed.end());
+  EXPECT_THAT((*found)["title"].get<std::string>(), HasSubstr("Lee (1995)"));
+  Json main = Json::array();
+  for (const Json& claim : record)
+    if (claim.value("main", false)) main.push_back(claim);
+  EXPECT_EQ((*found)["claims"], main);
+  EXPECT_LT(main.size(), record.size());
 }
 
 }  // namespace
