@@ -15,6 +15,7 @@
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
+#include "ingest/find/rim_shape.hpp"
 
 namespace shakebed::ingest {
 
@@ -130,7 +131,8 @@ struct Agreement {
   double rimless = 0;                 // share of the faces
   std::vector<Circle> faces, no_rim;  // whole faces with a rim or among such, and others beside them
   std::vector<Circle> all;            // these and those that are cut
-  [[nodiscard]] bool good() const { return missed <= most_missed_faces && rimless <= most_rimless; }
+  bool not_round = false;             // more of the faces have rims that are plainly not round than errors make so
+  [[nodiscard]] bool good() const { return missed <= most_missed_faces && rimless <= most_rimless && !not_round; }
 };
 Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
   Agreement agreement;
@@ -165,6 +167,9 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
     rimless += stands ? 0 : 1;
   }
   if (!places.empty()) agreement.rimless = rimless / static_cast<double>(places.size());
+  PictureMaps maps(frame, rims.model.search.wanted_px);
+  const std::vector<RimShape> shapes = shapes_of_rims(maps, rims.model, agreement.faces, agreement.all);
+  agreement.not_round = departing_of(shapes, shared_second(shapes)).more_than_seem();
   return agreement;
 }
 
@@ -275,6 +280,14 @@ std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*
   return std::nullopt;
 }
 
+// Circles that were not counted; what both searches found once.
+std::vector<Circle> not_round_of(const RimModel& model, const RimsFound& seen) {
+  std::vector<Circle> circles = seen.not_round;
+  if (model.gaps) circles.insert(circles.end(), model.gaps->not_round.begin(), model.gaps->not_round.end());
+  constexpr double one_thing = 0.8;  // sums of radii
+  return without_doubles(std::move(circles), one_thing);
+}
+
 // What rims cannot show: that more beads are there.
 void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCalibration& calibration) {
   double support = 0, others = 0, smallest = HUGE_VAL, largest = 0, explained = 0;
@@ -300,6 +313,8 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
                   100 * share);
     calibration.warnings.emplace_back(text);
   }
+  if (const std::vector<Circle> left_out = not_round_of(*calibration.rims, seen); !left_out.empty())
+    calibration.warnings.push_back(left_out_as_not_round(left_out, calibration.recorded_px));
   if (others > 0) {
     std::snprintf(text, sizeof text,
                   "Beads of several sizes were found, with radii from %.1f to %.1f px. In the first frame %.0f of %zu "
@@ -311,9 +326,11 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
 
 double share_missed_of(const GrayFrame& frame, const RimModel& model, const RimsFound& seen,
                        const std::optional<PixelRectangle>& region) {
-  std::vector<Circle> found;
-  for (const RimDisk& disk : seen.disks) found.push_back(disk.circle);
-  return share_missed(frame, model, found, seen.expected_missed, region);
+  // Where things lie that are no beads, none are missed.
+  std::vector<Circle> taken = not_round_of(model, seen);
+  for (const RimDisk& disk : seen.disks) taken.push_back(disk.circle);
+  const double missed = std::max(seen.expected_missed, expected_missed_beads(frame, model, taken, region));
+  return missed / std::max(1.0, static_cast<double>(seen.disks.size()) + missed);
 }
 
 FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, const FindOptions& options) {
@@ -427,7 +444,9 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
   if (options.quick_rims_only) return calibration_by_rims(frame, rims, options);
-  const bool of_one_size = rims.model.gaps->other_sizes.empty();
+  // Faces do not show whether things are round.
+  const GapModel& gaps = *rims.model.gaps;
+  const bool of_one_size = gaps.other_sizes.empty() && gaps.not_round.empty();
   if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
   if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
   if (!options.quick_rims) rims = most_telling(frame, std::move(rims), options);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstddef>
 #include <memory>
 #include <numbers>
@@ -17,6 +18,7 @@
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/painted_over.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "ingest/find/rim_shape.hpp"
 #include "statistics/ranks.hpp"
 #include "statistics/text.hpp"
 
@@ -41,16 +43,20 @@ double margin_of(const FinderCalibration& finder) {
   return finder.by_rims ? shade_margin_px + margin_radii * finder.radius_px : shade_margin_edges * finder.edge_width_px;
 }
 
+std::vector<Circle> circles_of(const std::vector<FoundDisk>& disks) {
+  std::vector<Circle> circles;
+  for (const FoundDisk& disk : disks) {
+    circles.emplace_back();
+    circles.back().x = disk.x_px, circles.back().y = disk.y_px, circles.back().radius = disk.radius_px;
+  }
+  return circles;
+}
+
 // Of the beads found in the painted frame, those that are beads of the frame.
 void keep_own(const GrayFrame& painted, const FinderCalibration& other, const std::vector<FoundDisk>& found,
               FindResult& more) {
   const BesideBeads free(found);
-  std::vector<Circle> places;
-  for (const FoundDisk& disk : more.disks) {
-    places.emplace_back();
-    places.back().x = disk.x_px, places.back().y = disk.y_px, places.back().radius = disk.radius_px;
-  }
-  const std::vector<Circle> rims = rims_at(painted, *other.rims, places);
+  const std::vector<Circle> rims = rims_at(painted, *other.rims, circles_of(more.disks));
   std::size_t at = 0;
   more.rejected += std::erase_if(more.disks, [&](const FoundDisk& disk) {
     const Circle& rim = rims[at++];
@@ -150,6 +156,17 @@ FindResult others_in(const GrayFrame& painted, const FinderCalibration& other, c
   return more;
 }
 
+// Whether most of their rims are plainly not round, unlike those of the beads found.
+bool mostly_not_round(const GrayFrame& frame, const RimModel& first, const RimModel& other,
+                      const std::vector<FoundDisk>& found, const std::vector<FoundDisk>& others) {
+  const std::vector<Circle> beads = circles_of(found), more = circles_of(others);
+  std::vector<Circle> all = beads;
+  all.insert(all.end(), more.begin(), more.end());
+  PictureMaps maps(frame, quick_search.wanted_px);
+  const std::complex<double> shared = shared_second(shapes_of_rims(maps, first, beads, all));
+  return departing_of(shapes_of_rims(maps, other, more, all), shared).most();
+}
+
 // Median over the disks of the mean level inside, by level_at(column, row) of pixels that are seen.
 template <class LevelAt>
 double median_inside(const GrayFrame& frame, const std::vector<FoundDisk>& disks, const LevelAt& level_at) {
@@ -222,11 +239,7 @@ void merge(FindResult more, double contrast, const FinderCalibration& first, Fin
 
 void count_missed(const GrayFrame& frame, const FindOptions& options, FinderCalibration& calibration,
                   const FindResult& found) {
-  std::vector<Circle> circles;
-  for (const FoundDisk& disk : found.disks) {
-    circles.emplace_back();
-    circles.back().x = disk.x_px, circles.back().y = disk.y_px, circles.back().radius = disk.radius_px;
-  }
+  const std::vector<Circle> circles = circles_of(found.disks);
   const double missed = expected_missed_beads(frame, *calibration.rims, circles, options.roi);
   calibration.expected_missed = missed / std::max(1.0, static_cast<double>(circles.size()) + missed);
 }
@@ -259,6 +272,11 @@ void learn_other_shade(const GrayFrame& frame, const FindOptions& options, Finde
   tell_radius(learned);
   FindResult more = others_in(best->painted, learned.calibration, find, found.disks);
   if (!enough(expected_of(more.disks), found.disks) || by_chance(more.disks)) return;
+  if (mostly_not_round(frame, *calibration.rims, *learned.calibration.rims, found.disks, more.disks)) {
+    const bool said = calibration.rims->gaps && !calibration.rims->gaps->not_round.empty();
+    if (!said) calibration.warnings.push_back(left_out_as_not_round(circles_of(more.disks), calibration.recorded_px));
+    return;
+  }
   // Marks on other ground, as letters beside the bed, are no beads of the bed.
   const auto [ratio, same_ground] = shades_of(frame, margin_of(calibration), find.polarity, found.disks, more.disks);
   if (!same_ground) return;

@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/picture_maps.hpp"
 #include "ingest/find/rim_gaps.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "ingest/find/rim_shape.hpp"
 #include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
@@ -185,6 +188,31 @@ LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known)
   return learned;
 }
 
+// Rims that are plainly not round are hardly those of beads, unless chance makes so many seem so.
+void doubt_departing(PictureMaps& maps, const RimModel& model, RimsFound& found) {
+  std::vector<Circle> circles;
+  for (const RimDisk& disk : found.disks) circles.push_back(disk.circle);
+  const std::vector<RimShape> shapes = shapes_of_rims(maps, model, circles, circles);
+  std::vector<RimShape> of_one_size;
+  for (std::size_t k = 0; k < shapes.size(); ++k)
+    if (!found.disks[k].other_size) of_one_size.push_back(shapes[k]);
+  const std::complex<double> shared = shared_second(of_one_size);
+  const Departing departing = departing_of(shapes, shared);
+  const bool left_out = departing.more_than_seem() && !departing.most();
+  std::vector<RimDisk> kept;
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    RimDisk& disk = found.disks[k];
+    const bool departs = departs_from_round(shapes[k], shared);
+    if (departs && left_out) {
+      found.not_round.push_back(disk.circle);
+      continue;
+    }
+    if (departs) disk.probability *= departing.round_nevertheless();
+    kept.push_back(disk);
+  }
+  found.disks = std::move(kept);
+}
+
 }  // namespace
 
 double RimModel::probability_of(double support) const { return probability_at(probability, support); }
@@ -240,7 +268,10 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
                   [&](const RimDisk& disk) { return disk.circle.contrast < faintest_contrast * model.contrast; });
   };
   drop_faint();
-  if (!model.gaps) return found;
+  if (!model.gaps) {
+    doubt_departing(maps, model, found);
+    return found;
+  }
   std::vector<Circle> beads;
   for (const RimDisk& disk : found.disks) beads.push_back(disk.circle);
   const GapCircles more = circles_in_gaps(maps, beads, model);
@@ -260,6 +291,7 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
   }
   drop_faint();
   sort_by_place(found.disks);
+  doubt_departing(maps, model, found);
   return found;
 }
 

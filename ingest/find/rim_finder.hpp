@@ -28,6 +28,9 @@ struct SizeBand {
 struct GapModel {
   std::vector<double> same_size;
   std::vector<SizeBand> other_sizes;  // empty: all beads are of one size
+  // Of the picture learned from: those of sizes that were left out, since most of their rims are plainly not round
+  // (rim_shape.hpp).
+  std::vector<Circle> not_round;
 };
 
 // At which scale rims are searched, and how.
@@ -90,10 +93,12 @@ void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size);
 void learn_gaps(PictureMaps& maps, LearnedRims& learned, bool one_size);
 
 struct RimsFound {
-  std::vector<RimDisk> disks;  // from top to bottom
-  double expected_missed = 0;  // beads: sum of the probabilities of circles that are not reported (after learn_gaps)
+  std::vector<RimDisk> disks;     // from top to bottom
+  std::vector<Circle> not_round;  // that would be disks, but for rims that are plainly not round
+  double expected_missed = 0;     // beads: sum of the probabilities of circles that are not reported (after learn_gaps)
 };
-// Disks that are beads with a probability of 0.8 or more, or of 0.5 in the gaps between them.
+// Disks that are beads with a probability of 0.8 or more, or of 0.5 in the gaps between them. Those whose rims are not
+// round are left out where they are more than errors make so, but for those of a picture in which most are not round.
 RimsFound find_rims(const GrayFrame& frame, const RimModel& model);
 
 // The support of circles of this radius at given places (after a fit that may move them by a third of the radius).

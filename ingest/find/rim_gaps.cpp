@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <numbers>
 #include <optional>
 
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/rim_probability.hpp"
+#include "ingest/find/rim_shape.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
 
@@ -266,7 +268,7 @@ struct WithCopies {
 class OtherSizes {
  public:
   OtherSizes(PictureMaps& maps, const RimModel& model, std::vector<Circle>& known)
-      : model_(model), known_(known), of_one_size_(static_cast<double>(known.size())) {
+      : maps_(maps), model_(model), known_(known), of_one_size_(static_cast<double>(known.size())) {
     const double radius = model.radius_px;
     constexpr std::array<double, 5> limits = {smallest_shared, smallest_spread, 1, largest_spread, largest_shared};
     for (std::size_t k = 0; k + 1 < limits.size(); ++k) {
@@ -278,6 +280,9 @@ class OtherSizes {
     }
     leave_out(around(radius));
   }
+
+  // Of sizes that were left out; what two sizes share once.
+  [[nodiscard]] std::vector<Circle> not_round() const { return without_doubles(not_round_, nearest_rims); }
 
   std::vector<SizeBand> find() {
     std::vector<SizeBand> found;
@@ -378,6 +383,10 @@ class OtherSizes {
     double expected = 0;
     for (const GapCircle& one : taken) expected += one.probability;
     if (!believed(band, expected, static_cast<double>(taken.size()))) return std::nullopt;
+    if (mostly_not_round(taken, with_these)) {
+      for (const GapCircle& one : taken) not_round_.push_back(one.circle);
+      return std::nullopt;
+    }
     band.radius_px = shared_radius(taken);
     known_ = std::move(with_these);
     return band;
@@ -391,6 +400,21 @@ class OtherSizes {
     return expected >= std::max(fewest_others, least_share_of_others * of_one_size_);
   }
 
+  // The beads found at first are round: light and pixels shape the rims of all alike.
+  [[nodiscard]] bool mostly_not_round(const std::vector<GapCircle>& taken, const std::vector<Circle>& disks) {
+    if (!shared_) shared_ = shared_second(shapes_of_rims(maps_, model_, some_of(known_), known_));
+    std::vector<Circle> circles;
+    for (const GapCircle& one : taken) circles.push_back(one.circle);
+    return departing_of(shapes_of_rims(maps_, model_, circles, disks), *shared_).most();
+  }
+
+  static std::vector<Circle> some_of(const std::vector<Circle>& circles) {
+    constexpr std::size_t enough = 120;
+    std::vector<Circle> some;
+    for (std::size_t k = 0; k < circles.size(); k += 1 + circles.size() / enough) some.push_back(circles[k]);
+    return some;
+  }
+
   // The median radius where the radii hardly differ.
   static double shared_radius(const std::vector<GapCircle>& taken) {
     constexpr double hardly = 0.03;  // standard deviation over the mean
@@ -401,9 +425,12 @@ class OtherSizes {
     return 1.4826 * median_of(deviations) < hardly * middle ? middle : 0;
   }
 
+  PictureMaps& maps_;
   const RimModel& model_;
   std::vector<Circle>& known_;
   double of_one_size_;
+  std::optional<std::complex<double>> shared_;  // second harmonic of the beads found at first
+  std::vector<Circle> not_round_;
   std::vector<Group> groups_;
   std::vector<SizeBand> tried_;  // sizes of their own; where one is not believed, its circles may be of a spread
 };
@@ -484,7 +511,11 @@ GapModel chances_in_gaps(PictureMaps& maps, const std::vector<Circle>& beads, co
   gaps.same_size = same.probabilities(known);
   std::vector<GapCircle> taken;
   take_likely(same.picture, gaps.same_size, nullptr, known, taken);
-  if (!one_size) gaps.other_sizes = OtherSizes(maps, model, known).find();
+  if (!one_size) {
+    OtherSizes others(maps, model, known);
+    gaps.other_sizes = others.find();
+    gaps.not_round = others.not_round();
+  }
   return gaps;
 }
 

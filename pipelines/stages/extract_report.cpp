@@ -120,6 +120,8 @@ StagePages extract_pages() {
            "use more uniform light."},
           {"is taken for a bead", measurement,
            "Look through the film for circles that are not beads; give a region (\"roi\") that contains only the bed."},
+          {"plainly not round", measurement,
+           "Check in the film that what has no circle is no bead. Densities are valid only for disks."},
           {"outlines are not those", measurement,
            "Check in the film that the circles are your beads. Densities are valid only for disks."},
           {"as in a plot", measurement, "Check in the film that the circles are your beads."},
