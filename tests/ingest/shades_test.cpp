@@ -92,9 +92,11 @@ GrayFrame bed_beside_text(int width, int height, double radius, std::vector<cv::
   for (double y = height - 10 - radius; y > 0.2 * height; y -= 1.77 * radius, ++row)
     for (double x = 12 + radius + (row % 2) * radius; x < 0.5 * width - 12 - radius; x += 2.04 * radius)
       if (random() % 12 != 0) beads.emplace_back(x, y);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width / 2; ++x)
-      for (const cv::Point2d& bead : beads) {
+  for (const cv::Point2d& bead : beads)
+    for (int y = std::max(0, static_cast<int>(bead.y - radius) - 1);
+         y < std::min(height, static_cast<int>(bead.y + radius) + 3); ++y)
+      for (int x = std::max(0, static_cast<int>(bead.x - radius) - 1);
+           x < std::min(width / 2, static_cast<int>(bead.x + radius) + 3); ++x) {
         const double away = std::hypot(x - bead.x, y - bead.y), cover = std::clamp(radius + 0.5 - away, 0.0, 1.0);
         if (cover == 0) continue;
         const double high = std::sqrt(std::max(0.0, 1 - away * away / (radius * radius)));
