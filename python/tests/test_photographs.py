@@ -59,7 +59,7 @@ def test_an_image_without_beads_is_said_to_have_none():
 def frames(tmp_path_factory):
     """A rendered bed, and what the command line measures of its pictures."""
     place = tmp_path_factory.mktemp("photographs")
-    bed = dict(SCENE, frames={"count": 6, "phases": 3})
+    bed = dict(SCENE, frames={"count": 4, "phases": 2})
     recipe = {"name": "photographs", "stages": [
         {"stage": "simulate", "id": "bed", **bed},
         {"stage": "render", "id": "film", "from": "bed", "scale": "0.2 mm/px", "seed": 1}]}

@@ -41,11 +41,11 @@ TEST(FinderBenchmark, TouchingNeighboursRaiseTheBoundWhereBlurReachesAcross) {
 
 TEST(FinderBenchmark, JointFitReachesTheBoundAndBeatsHough) {
   FinderBenchmarkOptions options;
-  options.width = 420;
-  options.height = 400;
+  options.width = 360;
+  options.height = 340;
   options.rows = 8;
-  options.gas_count = 60;
-  options.frames = 2;
+  options.gas_count = 40;
+  options.frames = 1;
   options.blurs = {1};
   options.noises = {5};
   const auto rows = benchmark_finder(options);

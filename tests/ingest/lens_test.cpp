@@ -49,11 +49,11 @@ GrayFrame seen_by(const LensCamera& camera, const std::vector<RenderedDisk>& dis
       double darker = 0;
       for (std::size_t k = 0; k < disks.size(); ++k) {
         const RenderedDisk& disk = disks[k];
-        const double reach = disk.radius_px + 3 + depth * middle_x;
+        const double reach = disk.radius_px + 2 + depth * middle_x;
         if (std::abs(here.x - disk.x_px) > reach || std::abs(here.y - disk.y_px) > reach) continue;
         const double away = std::hypot(here.x - disk.x_px, here.y - disk.y_px);
         if (away > reach) continue;
-        if (faces.depth == 0 && away < disk.radius_px - 3) {  // all its points lie inside
+        if (faces.depth == 0 && away < disk.radius_px - 2) {  // all its points lie inside
           darker += 64 * 140;
           continue;
         }
@@ -61,12 +61,16 @@ GrayFrame seen_by(const LensCamera& camera, const std::vector<RenderedDisk>& dis
         for (int j = 0; j < 8; ++j)
           for (int i = 0; i < 8; ++i) {
             const PixelPlace p = true_place(column - 0.5 + (i + 0.5) / 4, row - 0.5 + (j + 0.5) / 4);
-            const double dx = p.x - disk.x_px, dy = p.y - disk.y_px, radius = disk.radius_px;
-            if (std::hypot(dx, dy) < radius)
-              darker += faces.depth == 0 ? 140
-                                         : 140 + deep[k] * std::cos(2 * std::atan2(dy, dx) + turned[k]) *
-                                                     (dx * dx + dy * dy) / (radius * radius);
-            else if (std::hypot(dx - far_x, dy - far_y) < radius)
+            const double dx = p.x - disk.x_px, dy = p.y - disk.y_px, square = disk.radius_px * disk.radius_px;
+            const double to_far_x = dx - far_x, to_far_y = dy - far_y;
+            if (dx * dx + dy * dy < square)
+              darker +=
+                  faces.depth == 0
+                      ? 140
+                      : 140 + deep[k] *
+                                  ((dx * dx - dy * dy) * std::cos(turned[k]) - 2 * dx * dy * std::sin(turned[k])) /
+                                  square;
+            else if (to_far_x * to_far_x + to_far_y * to_far_y < square)
               darker += 140;
           }
       }

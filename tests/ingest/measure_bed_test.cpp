@@ -384,7 +384,7 @@ TEST(MeasureBed, FloorIsFollowedThroughTheShakersPeriod) {
 // lie above.
 TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   MeasureOptions options = options_of();
-  FrameSource source = FrameSource::from_frames(shaken_film(9, 0.3, 14, 1 / 13.7));  // of one period
+  FrameSource source = FrameSource::from_frames(shaken_film(9, 0.3, 10, 1 / 9.7));  // of one period
   const Measurement moving = measure_bed(source, options);
   EXPECT_EQ(moving.calibration.floor_reference, FloorReference::lowest_seen);
   EXPECT_NEAR(moving.calibration.floor_px, 279, 1);
@@ -393,7 +393,7 @@ TEST(MeasureBed, StatesHowFarAMovingFloorMayLieAboveWhereItIsSeen) {
   EXPECT_LT(moving.calibration.floor_std_error_px, 9 * 1.8);
   EXPECT_TRUE(floor_is_the_lowest(moving));
 
-  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 14, 1 / 13.7));
+  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 10, 1 / 9.7));
   const Measurement resting = measure_bed(still, options);
   EXPECT_EQ(resting.calibration.floor_reference, FloorReference::lowest_seen);
   EXPECT_GT(resting.calibration.floor_std_error_px, 0);
@@ -470,7 +470,7 @@ TEST(MeasureBed, CountsForTheColumnNumberWhatLiesWithinTheWidth) {
 }
 
 TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
-  const std::vector<GrayFrame> frames = shaken_film(9, 0.3, 100, 1 / 13.7);
+  const std::vector<GrayFrame> frames = shaken_film(9, 0.3, 80, 1 / 13.7);
   const auto warned = [](const Measurement& measured, const char* what) {
     return std::any_of(measured.warnings.begin(), measured.warnings.end(),
                        [&](const std::string& warning) { return warning.find(what) != std::string::npos; });
@@ -493,7 +493,7 @@ TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
 
   // With a sink the geometry comes from the film's beginning, the frequency from all of it.
   options.disk_sink = [](const FrameReport&, const std::vector<MeasuredDisk>&) {};
-  options.geometry_frames = 70;
+  options.geometry_frames = 60;
   source.rewind();
   const BedCalibration streamed = measure_bed(source, options).calibration;
   EXPECT_NEAR(streamed.shaking_frequency_hz, bed.shaking_frequency_hz, 1e-3);
@@ -511,7 +511,7 @@ TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
   EXPECT_FALSE(warned(measure_bed(source, options), "Hz was given"));
 
   options.shaking_frequency_hz.reset();
-  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 40, 1 / 13.7));
+  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 30, 1 / 13.7));
   const Measurement resting = measure_bed(still, options);
   EXPECT_EQ(resting.calibration.shaking_frequency_hz, 0);
   EXPECT_FALSE(resting.calibration.why_no_frequency.empty());

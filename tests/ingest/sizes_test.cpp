@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -49,24 +50,27 @@ using Face = double (*)(const Bead& bead, double u, double v);
 GrayFrame drawn(const std::vector<Bead>& beads, int width, int height, double background, Face face, unsigned seed) {
   std::mt19937 random(seed);
   GrayFrame frame{width, height, {}};
-  for (int row = 0; row < height; ++row)
+  for (int row = 0; row < height; ++row) {
+    std::vector<Bead> near;
+    std::copy_if(beads.begin(), beads.end(), std::back_inserter(near),
+                 [&](const Bead& one) { return std::abs(one.y - row) < one.radius + 1; });
     for (int column = 0; column < width; ++column) {
       double level = 0;
       for (const double dx : {-0.25, 0.25})
         for (const double dy : {-0.25, 0.25}) {
           const double x = column + dx, y = row + dy;
-          const auto bead = std::find_if(beads.begin(), beads.end(), [&](const Bead& one) {
+          const auto bead = std::find_if(near.begin(), near.end(), [&](const Bead& one) {
             const double across = one.x - x, down = one.y - y;
-            return std::abs(across) < one.radius && std::abs(down) < one.radius &&
-                   std::hypot(across, down) < one.radius;
+            return std::abs(across) < one.radius && std::hypot(across, down) < one.radius;
           });
-          level += bead == beads.end() ? background / 4
-                                       : face(*bead, (x - bead->x) / bead->radius, (y - bead->y) / bead->radius) / 4;
+          level += bead == near.end() ? background / 4
+                                      : face(*bead, (x - bead->x) / bead->radius, (y - bead->y) / bead->radius) / 4;
         }
       double noise = -6;
       for (int k = 0; k < 12; ++k) noise += static_cast<double>(random()) / 4294967296.0;
       frame.pixels.push_back(static_cast<float>(level + 2 * noise));
     }
+  }
   return frame;
 }
 

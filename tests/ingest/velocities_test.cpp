@@ -21,12 +21,12 @@ namespace {
 // Disks on a wide lattice whose velocities are an Ornstein-Uhlenbeck process of variance T/m per component around a
 // steady shear flow, seen with a localisation error: T is known exactly.
 Measurement walkers(std::size_t frames, double dt, double speed, double memory_s, double error_px, double flow,
-                    std::uint64_t seed) {
+                    std::uint64_t seed, int substeps = 10) {
   Measurement measurement;
   measurement.calibration.scale_m_per_px = 1e-4;
   measurement.calibration.radius_px = 10;  // D = 2 mm
   RandomStream random(seed);
-  constexpr int across = 20, up = 15, substeps = 10;
+  constexpr int across = 20, up = 15;
   struct Walker {
     double x, z, vx, vz;
   };
@@ -78,7 +78,7 @@ TEST(Velocities, OfDisplacementsHaveTheErrorOfTheirFrames) {
   double sum = 0, squares = 0, stated = 0;
   for (std::uint64_t film = 0; film < films; ++film) {
     const VelocityMeasurement found =
-        measure_velocities(walkers(60, 1.0 / 500, 0.06, 0.006, 0.1, 0.03, 100 + film), {.frame_rate_hz = 500});
+        measure_velocities(walkers(60, 1.0 / 500, 0.06, 0.006, 0.1, 0.03, 100 + film, 4), {.frame_rate_hz = 500});
     for (const KineticTemperature* t : {&found.horizontal, &found.vertical}) {
       sum += t->displacement_m, squares += t->displacement_m * t->displacement_m;
       stated += t->displacement_error_m * t->displacement_error_m;

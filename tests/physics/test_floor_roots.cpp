@@ -273,13 +273,13 @@ Verdict judge_adversarial(int flights, std::uint64_t seed, int only = -1) {
 }
 
 TEST(FloorRoots, AgreeWith60DigitsOnRandomFlights) {
-  expect_no_fault("random, 60 digits", judge_random<Digits60>(400, 31));
+  expect_no_fault("random, 60 digits", judge_random<Digits60>(150, 31));
 }
 TEST(FloorRoots, AgreeWithExtendedPrecisionOnRandomFlights) {
   expect_no_fault("random, extended precision", judge_random<long double>(15'000, 32));
 }
 TEST(FloorRoots, AgreeWith60DigitsOnAdversarialFlights) {
-  for (int k = 0; k < 7; ++k) expect_no_fault("adversarial, 60 digits", judge_adversarial<Digits60>(60, 33, k));
+  for (int k = 0; k < 7; ++k) expect_no_fault("adversarial, 60 digits", judge_adversarial<Digits60>(25, 33, k));
 }
 
 // 1e7 random flights and 1e5 adversarial ones, in parts of a quarter of a minute; those at Gamma = 1 +- 1e-12, whose

@@ -70,7 +70,7 @@ TEST(ShakenBed, RisesAndIsAsHotAsTheIndependentSimulationSays) {
 
 // 1.520 D and 0.866 mm with friction 0.2, by another friction law (a spring with memory): likeness, not identity.
 TEST(ShakenBed, IsCalmedByFriction) {
-  const Measurement bed = run_bed(0.92, 0.2, 400);
+  const Measurement bed = run_bed(0.92, 0.2, 100);
   expect_law("rise of the centre of mass [D]", bed.centre.value, bed.centre.std_error, 1.520, 0.152);
   expect_law("T_x/mg [mm]", bed.temperature_x.value, bed.temperature_x.std_error, 0.866, 0.173);
   expect_law("energy ledger, relative", bed.ledger.imbalance() / bed.ledger.dissipated, 0, 0, 1e-10);

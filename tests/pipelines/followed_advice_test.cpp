@@ -451,6 +451,8 @@ TEST(FollowedAdvice, OfAWarningEndsIt) {
 TEST(FollowedAdvice, OnALowProfileIsToGiveMorePhotographs) {
   Runner runner(dark_beads());
   Words arguments{"infer-bed", "photo.pgm", "--diameter", "3 mm", "--frequency", "20 Hz", "--beds", "20"};
+  for (const char* brief : {"rounds=0", "best=0", "settle=0.5 s", "measure=0.5 s"})
+    arguments.insert(arguments.end(), {"--set", std::string("/stages/infer/") + brief});
   const ProgramResult refused = runner.run(arguments);
   ASSERT_EQ(refused.exit_code, 5) << refused.err;
   EXPECT_THAT(refused.err, HasSubstr("Give more photographs of the bed (here 1)"));

@@ -18,13 +18,13 @@ namespace {
 using pipelines::Json;
 using pipelines::read_json;
 
-// 60 disks, Gamma = 4, e = 0.8, friction 0.3; 80 pictures at 800 Hz, two periods.
+// 60 disks, Gamma = 4, e = 0.8, friction 0.3; 48 pictures at 480 Hz, two periods.
 const std::string hidden = R"({ "name": "hidden", "stages": [
   { "stage": "simulate", "id": "bed", "seed": 11, "replicas": 1,
     "disks": { "count": 60, "diameter": "3 mm", "restitution": 0.8, "friction": 0.3, "inertia": "sphere" },
     "box": { "width": "36.9 mm", "sides": { "kind": "hard", "restitution": 0.8, "friction": 0.3 }, "lid": "open" },
     "floor": { "motion": "sinusoidal", "gamma": 4, "frequency": "20 Hz", "restitution": 0.8, "friction": 0.3 },
-    "settle": "2 s", "measure": "0.1 s", "frames": { "count": 80, "phases": 40 } },
+    "settle": "2 s", "measure": "0.1 s", "frames": { "count": 48, "phases": 24 } },
   { "stage": "render", "id": "film", "from": "bed", "scale": "0.3 mm/px", "exposure": "0.2 ms" } ] })";
 
 class InferBed : public testing::Test {
@@ -50,7 +50,7 @@ ScratchFolder* InferBed::folder_ = nullptr;
 // amplitude of the floor.
 TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
   const ProgramResult ran =
-      infer("o", {"--frequency", "20 Hz", "--frame-rate", "800 Hz", "--beds", "20", "--set", "/stages/infer/rounds=0",
+      infer("o", {"--frequency", "20 Hz", "--frame-rate", "480 Hz", "--beds", "20", "--set", "/stages/infer/rounds=0",
                   "--set", "/stages/infer/best=1", "--set", "/stages/infer/best_replicas=2", "--set",
                   "/stages/infer/measure=0.5 s", "--set", "/stages/infer/settle=1 s"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
@@ -90,7 +90,7 @@ TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
 // scene. A bed settles for 50 periods and is measured as long as the film, two of them.
 TEST_F(InferBed, WritesTheRangesThatAreAskedFor) {
   const ProgramResult ran =
-      infer("o", {"--frequency", "20 Hz", "--frame-rate", "800 Hz", "--gamma", "2,7", "--restitution", "0.5,0.9",
+      infer("o", {"--frequency", "20 Hz", "--frame-rate", "480 Hz", "--gamma", "2,7", "--restitution", "0.5,0.9",
                   "--friction", "0.1,0.3", "--beds", "31", "--plateau-density", "1.1", "--only", "figure"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   const Json recipe = read_json(*folder_ / "o/resolved.json"), stage = recipe["stages"].back();
@@ -108,7 +108,7 @@ TEST_F(InferBed, WritesTheRangesThatAreAskedFor) {
   }
   EXPECT_EQ(stage["disks"]["inertia"], "sphere");
   EXPECT_EQ(stage["settle"], "2.5 s");
-  EXPECT_EQ(stage["measure"], "0.1 s") << "80 frames at 800 Hz are two periods of 20 Hz";
+  EXPECT_EQ(stage["measure"], "0.1 s") << "48 frames at 480 Hz are two periods of 20 Hz";
   EXPECT_EQ(stage["first"], 31);
   EXPECT_EQ(stage["each"], 10);
   EXPECT_EQ(stage["rounds"], 2);

@@ -63,7 +63,7 @@ TEST(InferNumbers, BedsAreThoseOfTheSimulation) {
     "floor": { "motion": "sinusoidal", "gamma": )" +
                  first["values"][0].dump() + R"(, "frequency": 0.35, "restitution": )" + first["values"][1].dump() +
                  R"(, "friction": 0.3 },
-    "settle": 20, "measure": 60, "profile": { "spacing": 0.25, "kernel": { "kind": "gaussian", "width": 0.5 } } },
+    "settle": 10, "measure": 30, "profile": { "spacing": 0.25, "kernel": { "kind": "gaussian", "width": 0.5 } } },
     { "stage": "fit", "from": "bed", "plateau_density": 1.10 } ] })");
   ASSERT_EQ(run_shakebed({"run", "s.json", "--out", "s", "--quiet"}, found().folder.path()).exit_code, 0);
   const Json bed = Json::parse(read_text(found().folder / "s/bed/observables.json"));

@@ -196,7 +196,7 @@ class InferenceFromBeds : public testing::Test {
     ::setenv("PATH", "", 1);
     stage_.reduced = true;
     recipe_ = Json::parse(infer_recipe)["stages"][0];
-    Json from{{"scene", Json::object()}, {"settle", 20}, {"measure", 60}, {"phases", 8}, {"kernel_width", 0.5}};
+    Json from{{"scene", Json::object()}, {"settle", 10}, {"measure", 30}, {"phases", 8}, {"kernel_width", 0.5}};
     from["plateau_density"] = 1.1;
     for (const char* key : {"disks", "box", "floor"}) from["scene"][key] = recipe_[key];
     from["parameters"]["gamma"] = Json{{"set", {"/floor/gamma"}}, {"unit", ""}, {"values", nullptr}};
@@ -356,14 +356,14 @@ TEST_F(InferenceFromBeds, TakesBedsOfTheSameMeasurement) {
     }
     return false;
   };
-  EXPECT_TRUE(refused("settle", 21));
-  EXPECT_TRUE(refused("measure", 61));
+  EXPECT_TRUE(refused("settle", 11));
+  EXPECT_TRUE(refused("measure", 31));
   EXPECT_TRUE(refused("phases", 16));
   EXPECT_TRUE(refused("kernel_width", 0.6));
   EXPECT_TRUE(refused("plateau_density", 1.0));
   EXPECT_TRUE(refused("views", {"average"}));
   EXPECT_TRUE(refused("frame_rate", 7));
-  EXPECT_FALSE(refused("settle", 20));
+  EXPECT_FALSE(refused("settle", 10));
 }
 
 }  // namespace

@@ -218,7 +218,7 @@ TEST(StatedResults, OfAFilm) {
     { "stage": "simulate", "id": "bed", "disks": { "count": 60, "diameter": "3 mm", "restitution": 0.8 },
       "box": { "width": "18.9 mm", "sides": { "kind": "hard", "restitution": 0.8 } },
       "floor": { "motion": "sinusoidal", "gamma": 3, "frequency": "20 Hz", "restitution": 0.8 },
-      "settle": "0.5 s", "measure": "0.2 s", "frames": { "count": 128, "phases": 32 } },
+      "settle": "0.5 s", "measure": "0.1 s", "frames": { "count": 64, "phases": 32 } },
     { "stage": "render", "from": "bed", "scale": "0.3 mm/px" },
     { "stage": "extract", "from": "render", "diameter": "3 mm", "frame_rate": "640 Hz", "frequency": "20 Hz",
       "bead_number": 60, "kernel": { "kind": "top_hat", "width": 1 } },

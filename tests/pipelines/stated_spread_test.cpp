@@ -127,7 +127,7 @@ TEST(StatedErrors, OfAFluidAreWhatFluidsScatterBy) {
   const StatedSpread spread = spread_of(
       R"("units": "reduced", "disks": { "count": 30 }, "gravity": 0,
       "box": { "width": 8, "sides": "periodic", "lid": { "kind": "periodic", "height": 8 } },
-      "settle": 10, "measure": 100, "observe": ["order"])",
+      "settle": 10, "measure": 60, "observe": ["order"])",
       false);
   EXPECT_GE(spread.expect(0.6, 1.6), 4U);
 }
@@ -136,7 +136,7 @@ TEST(StatedErrors, OfAFreeLidAreWhatItScattersBy) {
   const StatedSpread spread = spread_of(
       R"("units": "reduced", "disks": { "count": 20 }, "start_temperature": 2,
       "box": { "width": 5.3, "sides": "periodic", "lid": { "kind": "free", "height": 9, "mass": 3 } },
-      "bath": { "kind": "langevin", "temperature": 2, "rate": 1, "interval": 0.1 }, "settle": 10, "measure": 150)",
+      "bath": { "kind": "langevin", "temperature": 2, "rate": 1, "interval": 0.1 }, "settle": 10, "measure": 100)",
       false);
   EXPECT_GE(spread.expect(0.6, 1.6), 5U);
   EXPECT_GT(spread.mean("lid_height"), spread.mean("center_of_mass"));

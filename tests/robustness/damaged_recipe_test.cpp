@@ -18,7 +18,7 @@ using namespace shakebed::tests;
 namespace fs = std::filesystem;
 
 constexpr int damaged_recipes = 300;
-constexpr int shards = 12;  // the first is a quick test, the others are long ones
+constexpr int shards = 20;  // the first is a quick test, the others are long ones
 constexpr int real_runs_a_shard = 2;
 
 std::vector<std::string> sound_recipes() {

@@ -26,7 +26,7 @@ std::string bed_recipe(int replicas) {
       "bath": { "kind": "langevin", "temperature": 1, "rate": 0.2, "interval": 0.5 },
       "schedule": [ { "temperature": 3, "ramp": 40, "hold": 100 }, { "temperature": 1, "ramp": 40, "hold": 100 } ],
       "observe": ["order", "velocities", "displacement", "pressure", "phases"],
-      "settle": 50, "measure": 600, "frames": { "count": 1500, "phases": 8 }, "checkpoint_seconds": 0.03,
+      "settle": 50, "measure": 400, "frames": { "count": 1000, "phases": 8 }, "checkpoint_seconds": 0.03,
       "replicas": )" +
          std::to_string(replicas) + " } ] }";
 }

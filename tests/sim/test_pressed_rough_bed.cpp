@@ -274,7 +274,7 @@ TEST(PressedRoughBed, OfTheEngineKeepsTheLedgerAndItsOverlaps) {
 // The springs that they lay on would be compressed by 0.01 to 0.02 D.
 TEST(PressedRoughBed, LandsHarderThanItLay) {
   bool was_pressed = false;
-  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+  for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE(seed);
     Scene scene = high_rough_scene(seed);
     const auto bed = simulate(scene);
@@ -333,12 +333,12 @@ TEST(PressedRoughBed, PressesOnTheFloorWithItsWeight) {
   for (const double gamma : {0.8, 1.3}) {
     const Scene scene = rough_scene(gamma, 12.3, 0.6);
     const auto bed = simulate(scene);
-    bed->advance_to(20 * rough_period);
+    bed->advance_to(10 * rough_period);
     FlightObserver observer(scene, bed->properties(), LayerGrid{-1, 0.5, 60});
     bed->watch(&observer);
     observer.begin(bed->time());
-    for (int k = 1; k <= 20; ++k) {
-      bed->advance_to((20 + k) * rough_period);
+    for (int k = 1; k <= 10; ++k) {
+      bed->advance_to((10 + k) * rough_period);
       observer.end_block(bed->time());
     }
     const double weight = 120 / 12.3;
