@@ -169,7 +169,8 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   if (!places.empty()) agreement.rimless = rimless / static_cast<double>(places.size());
   PictureMaps maps(frame, rims.model.search.wanted_px);
   const std::vector<RimShape> shapes = shapes_of_rims(maps, rims.model, agreement.faces, agreement.all);
-  agreement.not_round = departing_of(shapes, shared_second(shapes)).more_than_seem();
+  const Departing departing = departing_of(shapes, shared_second(shapes));
+  agreement.not_round = departing.more_than_seem() && !departing.most();  // most: the survey has judged them
   return agreement;
 }
 

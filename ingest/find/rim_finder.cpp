@@ -198,7 +198,8 @@ void doubt_departing(PictureMaps& maps, const RimModel& model, RimsFound& found)
     if (!found.disks[k].other_size) of_one_size.push_back(shapes[k]);
   const std::complex<double> shared = shared_second(of_one_size);
   const Departing departing = departing_of(shapes, shared);
-  const bool left_out = departing.more_than_seem() && !departing.most();
+  if (departing.most()) return;  // the survey has judged them
+  const bool left_out = departing.more_than_seem();
   std::vector<RimDisk> kept;
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     RimDisk& disk = found.disks[k];
