@@ -577,7 +577,7 @@ TEST(FrameBudget, TriesFramesOfFewerPixelsWhereManyAreMeasured) {
     { "stage": "simulate", "id": "bed", "seed": 5, "replicas": 1, "disks": { "count": 24, "diameter": "3 mm", "restitution": 0.9 },
       "box": { "width": "15.9 mm", "sides": { "kind": "hard", "restitution": 0.9 } },
       "floor": { "motion": "sinusoidal", "amplitude": "2 mm", "frequency": "20 Hz", "restitution": 0.9 },
-      "settle": "1 s", "measure": "8 s", "frames": { "count": 66 } },
+      "settle": "0.5 s", "measure": "3.3 s", "frames": { "count": 66 } },
     { "stage": "render", "from": "bed", "scale": "0.12 mm/px", "noise": 2 } ] })");
   ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "o"}, folder.path()).exit_code, 0);
   const auto fit = [&](const char* out, const std::vector<std::string>& more) {
@@ -596,10 +596,6 @@ TEST(FrameBudget, TriesFramesOfFewerPixelsWhereManyAreMeasured) {
   for (const char* name : {"left_wall", "right_wall", "floor"})
     EXPECT_NEAR(value(coarse[name]), value(fine[name]), 0.25) << name << ", in pixels of the frames as they are";
 
-  // A change of --set decides.
-  const ProgramResult set = fit("set", {"--budget", "0.1 %", "--dry-run", "--set", "/stages/extract/reduction=3"});
-  ASSERT_EQ(set.exit_code, 0) << set.err;
-  EXPECT_THAT(set.err, Not(HasSubstr("averages them")));
   const ProgramResult blind = fit("blind", {"--set", "/stages/extract/reduction=5"});
   EXPECT_EQ(blind.exit_code, 5);
   EXPECT_THAT(blind.err, HasSubstr("averaged over squares of 5 px (reduction), a bead of 12."));
