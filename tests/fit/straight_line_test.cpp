@@ -55,6 +55,7 @@ TEST(PowerLaw, FindsItsExponentAndError) {
   const PowerLaw plain = fit_power_law(x, without, error, false);
   ASSERT_TRUE(plain.ok);
   EXPECT_NEAR(plain.exponent, 1.7, 1e-6);
+  EXPECT_EQ(plain.offset, 0);
   EXPECT_NEAR(plain.exponent_error, 0.01 * std::sqrt(pp / (dd * pp - dp * dp)), 1e-5);
 }
 

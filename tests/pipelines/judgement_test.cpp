@@ -135,6 +135,11 @@ TEST(HardDiskTrust, IsThatOfTheNearestBedOfTheStudy) {
     if (!trust.covered) continue;
     EXPECT_THAT(trust.why, HasSubstr(fmt::format("e = {:g}, friction {:g}, Gamma = {:g}", bed.restitution, bed.friction,
                                                  bed.gamma)));
+    const auto percent = [](double ratio, double error) {
+      return fmt::format("{:+.2g} ± {:.2g} %", 100 * ratio - 100, 100 * error);
+    };
+    EXPECT_THAT(trust.why, HasSubstr("T_x " + percent(bed.ratio_x, bed.error_x)));
+    EXPECT_THAT(trust.why, HasSubstr("T_z " + percent(bed.ratio_z, bed.error_z)));
   }
   const HardDiskTrust far = trust_in_hard_disks({0.3, 0, 0, 20, 100});
   EXPECT_FALSE(far.covered);
