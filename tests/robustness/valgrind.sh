@@ -35,7 +35,7 @@ END
 cat >infer.json <<END
 { "name": "infer", "stages": [ { "stage": "infer", "units": "reduced", "disks": { "count": 20, "restitution": 0.7 },
   "box": { "width": 5.3, "sides": "periodic" }, "floor": { "motion": "sinusoidal", "gamma": 4, "frequency": 0.35, "restitution": 0.7 },
-  "settle": 3, "measure": 9, "phases": 4,
+  "settle": 3, "measure": 12, "phases": 4,
   "parameters": { "gamma": { "set": ["/floor/gamma"], "low": 3, "high": 6 },
                   "restitution": { "set": ["/disks/restitution", "/floor/restitution"], "low": 0.5, "high": 0.9 } },
   "targets": { "center_of_mass_rise": { "value": 1, "std_error": 0.3 } },
