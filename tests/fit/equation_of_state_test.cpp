@@ -47,6 +47,9 @@ TEST(Enskog, MatchesNinetyDigitValuesOfFAndContactValue) {
 // Z = 1 + 2 nu chi for hard disks, whatever the formula of Z.
 TEST(EquationsOfState, HaveTheContactValueOfTheirPressure) {
   for (const EquationOfState* equation : equations_of_state()) {
+    if (const Value alone = equation->contact_value(0); alone.ok()) {
+      EXPECT_EQ(alone.value, 1) << equation->name() << ": two disks alone do not know of others";
+    }
     int asked = 0;
     for (double nu = 0.04; nu < 0.7; nu += 0.03) {
       const Value z = equation->compressibility_factor(nu_to_phi(nu)), chi = equation->contact_value(nu_to_phi(nu));
