@@ -518,6 +518,13 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
   EXPECT_EQ(rows("high") - rows("low"), 60) << "15 mm more to see, of 0.25 mm a pixel";
 }
 
+// fit-images of the frames that a recipe has rendered into o.
+ProgramResult fit_film(const ScratchFolder& folder, const char* out, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments{"fit-images", "o/render/frames", "--diameter", "3 mm", "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_shakebed(arguments, folder.path());
+}
+
 // 48 frames of a bed, of which a part is measured: for an error, and for a time.
 TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
   const ScratchFolder folder;
@@ -528,11 +535,7 @@ TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
       "settle": "1 s", "measure": "5 s", "frames": { "count": 48 } },
     { "stage": "render", "from": "bed", "scale": "0.3 mm/px", "noise": 2 } ] })");
   ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "o"}, folder.path()).exit_code, 0);
-  const auto fit = [&](const char* out, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"fit-images", "o/render/frames", "--diameter", "3 mm", "--out", out};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_shakebed(arguments, folder.path());
-  };
+  const auto fit = [&](const char* out, const std::vector<std::string>& more) { return fit_film(folder, out, more); };
   const ProgramResult some = fit("some", {"--budget", "6 %"});
   ASSERT_EQ(some.exit_code, 0) << some.err;
   const Json said = read_json(folder / "some/manifest.json")["budget"];
@@ -580,11 +583,7 @@ TEST(FrameBudget, TriesFramesOfFewerPixelsWhereManyAreMeasured) {
       "settle": "0.5 s", "measure": "3.3 s", "frames": { "count": 66 } },
     { "stage": "render", "from": "bed", "scale": "0.12 mm/px", "noise": 2 } ] })");
   ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "o"}, folder.path()).exit_code, 0);
-  const auto fit = [&](const char* out, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"fit-images", "o/render/frames", "--diameter", "3 mm", "--out", out};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_shakebed(arguments, folder.path());
-  };
+  const auto fit = [&](const char* out, const std::vector<std::string>& more) { return fit_film(folder, out, more); };
   const ProgramResult many = fit("many", {"--budget", "0.1 %", "--dry-run"});
   ASSERT_EQ(many.exit_code, 0) << many.err;
   const Json fine = read_json(folder / "many/.pilot/every-4/extract/extract.json"),
