@@ -40,8 +40,8 @@ std::uint64_t coarsest_reduction(double radius_px, std::uint64_t in_use) {
 }
 
 bool coarser_may_gain(const FrameChoice& fine, std::uint64_t all, const Budget& left) {
-  constexpr std::uint64_t many_frames = 64;
-  return left.error > 0 ? fine.frames >= many_frames : fine.frames < all;
+  constexpr std::uint64_t many_for_error = 64, many_for_time = 32;
+  return left.error > 0 ? fine.frames >= many_for_error : fine.frames < all && fine.frames >= many_for_time;
 }
 
 bool coarser_is_better(const FrameChoice& fine, const FrameChoice& coarse, double shift, const Budget& budget) {

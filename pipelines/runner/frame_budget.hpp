@@ -32,14 +32,13 @@ struct FrameChoice {
 // the reciprocal of a variance of frames - 1 degrees of freedom is too large on average.
 FrameChoice choose_frames(const FramePilot& pilot, std::uint64_t all, const Budget& left);
 
-// Frames may be averaged over squares of so many pixels that a bead has still this radius [px]. In 48 rendered frames
-// of 300 beads (radius 20 and 40 px) T was then the same within 0.01 %. Its error was 3 % larger, and disks were found
-// in 0.4 of the time.
+// Frames may be averaged over squares of so many pixels that a bead has still this radius [px]. What that changes was
+// measured: docs/how-to/budget.md.
 constexpr double enough_radius_px = 6;
 // The side of these squares [px], given the one in use.
 std::uint64_t coarsest_reduction(double radius_px, std::uint64_t in_use);
-// Whether a pilot with such frames could gain more than it costs: many frames are needed for an error, or not all of
-// them fit into a time.
+// Whether a pilot with such frames could gain more than it costs: many frames are needed for an error, or many fit into
+// the time that is left, but not all.
 bool coarser_may_gain(const FrameChoice& fine, std::uint64_t all, const Budget& left);
 // Whether the choice from reduced frames is better. `shift`: by which share of itself T of the same frames has changed.
 // For an error: it takes less than 0.8 of the time, and the shift is below a tenth of the error. For a time: error and

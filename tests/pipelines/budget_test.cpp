@@ -404,8 +404,9 @@ TEST(ReducedFrames, AreTriedWhereManyFramesAreMeasuredOrNotAllFitIntoTheTime) {
   EXPECT_TRUE(coarser_may_gain({.frames = 64}, 1000, error_of(0.01)));
   EXPECT_FALSE(coarser_may_gain({.frames = 63}, 1000, error_of(0.01)));
   const Budget time{.seconds = 10, .text = "10 s"};
-  EXPECT_TRUE(coarser_may_gain({.frames = 20}, 21, time));
-  EXPECT_FALSE(coarser_may_gain({.frames = 21}, 21, time));
+  EXPECT_TRUE(coarser_may_gain({.frames = 32}, 33, time));
+  EXPECT_FALSE(coarser_may_gain({.frames = 33}, 33, time));
+  EXPECT_FALSE(coarser_may_gain({.frames = 31}, 1000, time)) << "the pilot would take too much of it";
 }
 
 TEST(ReducedFrames, AreChosenForAnErrorWhereTheyAreCheaperAndChangeLittle) {
