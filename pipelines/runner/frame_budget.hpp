@@ -37,7 +37,7 @@ FrameChoice choose_frames(const FramePilot& pilot, std::uint64_t all, const Budg
 constexpr double enough_radius_px = 6;
 // The side of these squares [px], given the one in use.
 std::uint64_t coarsest_reduction(double radius_px, std::uint64_t in_use);
-// Whether a pilot with such frames could gain more than it costs: many frames are needed for an error, or many fit into
+// Whether a pilot with such frames could gain more than it costs: many frames are needed for an error. Or many fit into
 // the time that is left, but not all.
 bool coarser_may_gain(const FrameChoice& fine, std::uint64_t all, const Budget& left);
 // Whether the choice from reduced frames is better. `shift`: by which share of itself T of the same frames has changed.
