@@ -14,6 +14,7 @@
 #include "pipelines/cli/image_arguments.hpp"
 #include "pipelines/cli/run_plan.hpp"
 #include "pipelines/formats/quantity.hpp"
+#include "pipelines/runner/budget.hpp"
 #include "pipelines/stages/images_module.hpp"
 #include "pipelines/stages/scene_options.hpp"
 #include "statistics/kernel.hpp"
@@ -106,10 +107,16 @@ Json recipe_of(const FitImagesArguments& image) {
   return recipe;
 }
 
-// --budget: a part of the frames.
-int fit_some_images(const Call& call, const FitImagesArguments& image) {
+// Of a preview, too, which does not use it: the same options are for the run after it.
+std::optional<Budget> budget_of(const FitImagesArguments& image) {
+  if (!image.budget) return std::nullopt;
   if (image.frame_rate)
     throw UsageError("--budget: velocities need successive frames, so it cannot be combined with --frame-rate");
+  return parse_budget(*image.budget);
+}
+
+// --budget: a part of the frames.
+int fit_some_images(const Call& call, const FitImagesArguments& image, const Budget& budget) {
   Console console(level_of(call));
   FitImagesArguments some = image;
   const auto plan = [&some](std::uint64_t stride, std::optional<std::uint64_t> reduction) {
@@ -119,7 +126,7 @@ int fit_some_images(const Call& call, const FitImagesArguments& image) {
   install_interrupt_handler();
   const fs::path out = out_of(call, plan(1, {}).name);
   const BudgetedFrames chosen =
-      frames_by_budget({parse_budget(*image.budget), image.files, out, image.run.jobs, image.run.force, plan}, console);
+      frames_by_budget({budget, image.files, out, image.run.jobs, image.run.force, plan}, console);
   some.run.chosen = chosen.record;
   Json answer;
   const int code =
@@ -131,9 +138,10 @@ int fit_some_images(const Call& call, const FitImagesArguments& image) {
 
 int fit_images(const Call& call, const FitImagesArguments& image) {
   check_arguments(image);
+  const std::optional<Budget> budget = budget_of(image);
   Plan plan = plan_of(recipe_of(image), image);  // a preview accepts what a run accepts
   if (image.preview) return preview_images(call, image);
-  if (image.budget) return fit_some_images(call, image);
+  if (budget) return fit_some_images(call, image, *budget);
   return run_plan_command(call, image.run, std::move(plan));
 }
 

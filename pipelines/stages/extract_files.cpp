@@ -142,7 +142,7 @@ Json bed_numbers(const ExtractOptions& options, const ingest::Measurement& found
   return result;
 }
 
-Json velocity_numbers(const ingest::VelocityMeasurement& velocities) {
+Json velocity_numbers(const ingest::VelocityMeasurement& velocities, double frame_rate_hz) {
   const auto temperature = [](const ingest::KineticTemperature& t) {
     Json json = quantity_json(t.over_mg_m, "m", t.std_error_m);
     json["localisation_bias"] = t.localisation_bias_m, json["finite_time_factor"] = t.finite_time_factor;
@@ -155,6 +155,7 @@ Json velocity_numbers(const ingest::VelocityMeasurement& velocities) {
               {"temperature_z_over_mg", temperature(velocities.vertical)},
               {"temperature_x_of_displacements_over_mg", of_displacements(velocities.horizontal)},
               {"temperature_z_of_displacements_over_mg", of_displacements(velocities.vertical)},
+              {"frame_rate", quantity_json(frame_rate_hz, "Hz")},
               {"usable", velocities.usable()},
               {"linked_share", velocities.linked_share},
               {"mean_step", quantity_json(velocities.mean_step, "D")}};

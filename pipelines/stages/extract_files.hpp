@@ -15,7 +15,7 @@ namespace shakebed::pipelines {
 // What extract.json says of the bed and of its profile.
 Json bed_numbers(const ExtractOptions& options, const ingest::Measurement& found);
 // "/velocities" of extract.json.
-Json velocity_numbers(const ingest::VelocityMeasurement& velocities);
+Json velocity_numbers(const ingest::VelocityMeasurement& velocities, double frame_rate_hz);
 
 // The bead as learned from the frames, by distance from its centre.
 Table bead_table(Table table, const ingest::FinderCalibration& finder);

@@ -360,7 +360,7 @@ class Extraction {
     const auto velocities = on_the_way.velocities();
     if (!velocities) return;
     for (const std::string& warning : velocities->warnings) context_.warning(warning);
-    result["velocities"] = velocity_numbers(*velocities);
+    result["velocities"] = velocity_numbers(*velocities, *measure_.frame_rate_hz);
   }
 
   const ExtractOptions& options_;

@@ -95,6 +95,8 @@ void state_velocities(ResultList& list, const ExtractOptions& options) {
     list.quantity(std::string("/velocities/temperature_") + axis + "_of_displacements_over_mg", "m",
                   "the same from the displacements between frames, without the correction for the time between them",
                   timed, true);
+  list.quantity("/velocities/frame_rate", "Hz",
+                "rate of the frames between which disks are followed: \"frame_rate\" over \"stride\"", timed, true);
   list.truth("/velocities/usable",
              "whether the velocities are reliable: enough disks were followed, and few collided between frames", timed,
              true);

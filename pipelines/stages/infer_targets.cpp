@@ -143,6 +143,19 @@ ScaledTarget scaled(std::size_t number, double value, double error, bool include
   return out;
 }
 
+// Displacements depend on the time between frames: the beds are to be looked at as often as the film was.
+void require_same_frame_rate(const InferTarget& target, const Json& result, const InferOptions& options) {
+  const Json* found = find_pointer(result, "/velocities/frame_rate/value");
+  if (!target.at.ends_with("_of_displacements_over_mg") || found == nullptr || !options.bed.frame_rate) return;
+  constexpr double rounding = 1e-6;
+  const double film = found->get<double>(), beds = *options.bed.frame_rate;
+  if (std::abs(film / beds - 1) > rounding)
+    throw InputError(fmt::format(
+        "{}: these displacements are between frames at {} Hz, but the beds of the inference are seen at {} Hz. "
+        "Give \"frame_rate\": \"{} Hz\"",
+        target.at, number_text(film), number_text(beds), number_text(film)));
+}
+
 ScaledTarget number_target(const RunContext& context, const InferOptions& options, std::size_t k) {
   InferTarget target = *options.targets[k];
   if (!target.at.empty()) {
@@ -152,6 +165,7 @@ ScaledTarget number_target(const RunContext& context, const InferOptions& option
     if (found == nullptr || !found->contains("value") || !(*found)["value"].is_number())
       throw InputError(
           fmt::format("{}: the result at this pointer is not a number, so it cannot be a target", target.at));
+    require_same_frame_rate(target, result, options);
     target.value = (*found)["value"].get<double>();
     if (found->contains("std_error")) {
       const Json& error = (*found)["std_error"];

@@ -160,7 +160,7 @@ TEST(ExtractNumbers, OfVelocitiesStandUnderTheirNames) {
   velocities.horizontal = {1e-3, 2e-4, 3e-5, 1.1, 0.1, 7e-4, 8e-5};
   velocities.vertical = {4e-3, 5e-4, 6e-5, 1.2, 0.1, 9e-4, 2e-5};
   velocities.linked_share = 0.97, velocities.mean_step = 0.14;
-  const Json json = velocity_numbers(velocities);
+  const Json json = velocity_numbers(velocities, 250);
   const Json &x = json["temperature_x_over_mg"], &z = json["temperature_z_over_mg"];
   EXPECT_EQ(value(x), 1e-3);
   EXPECT_EQ(error(x), 2e-4);
@@ -181,11 +181,13 @@ TEST(ExtractNumbers, OfVelocitiesStandUnderTheirNames) {
   EXPECT_EQ(json["linked_share"], 0.97);
   EXPECT_EQ(json["usable"], true);
   velocities.horizontal.finite_time_factor = 2.1;
-  EXPECT_EQ(velocity_numbers(velocities)["usable"], false);
+  EXPECT_EQ(velocity_numbers(velocities, 250)["usable"], false);
   velocities.horizontal.finite_time_factor = 1.1, velocities.linked_share = 0.65;
-  EXPECT_EQ(velocity_numbers(velocities)["usable"], false);
+  EXPECT_EQ(velocity_numbers(velocities, 250)["usable"], false);
   EXPECT_EQ(value(json["mean_step"]), 0.14);
   EXPECT_EQ(json["mean_step"]["unit"], "D");
+  EXPECT_EQ(value(json["frame_rate"]), 250);
+  EXPECT_EQ(json["frame_rate"]["unit"], "Hz");
 }
 
 // The bed that photographs show, in metres.

@@ -229,6 +229,19 @@ TEST_F(TargetsOfStages, AreOnTheScaleOnWhichTheyAreCompared) {
   EXPECT_EQ(refusal(), "temperature_over_mg: the target must be above 0, but is 0");
 }
 
+// Every second frame of a film of 500 Hz.
+TEST_F(TargetsOfStages, AreDisplacementsBetweenFramesAtTheSameRate) {
+  target("temperature_x_without_flow_over_mg").at = "/film/velocities/temperature_x_of_displacements_over_mg";
+  write_text(stage_.file("film/extract.json"), R"({ "velocities": { "frame_rate": { "value": 250, "unit": "Hz" },
+      "temperature_x_of_displacements_over_mg": { "value": 0.001, "std_error": 0.0001 } } })");
+  options_.bed.frame_rate = 500;
+  EXPECT_THAT(refusal(),
+              HasSubstr("these displacements are between frames at 250 Hz, but the beds of the inference are "
+                        "seen at 500 Hz. Give \"frame_rate\": \"250 Hz\""));
+  options_.bed.frame_rate = 250;
+  EXPECT_EQ(refusal(), "");
+}
+
 // Densities 1, 0.6, 0 at heights 0, 1, 2. A scale that is 1 % too large changes a density by 0.01 (2 n + z dn/dz), a
 // floor that is 0.05 D off by 0.05 dn/dz; at height 1 the slope from 0.9 to 1.1 is -0.5.
 TEST_F(TargetsOfStages, HaveTheErrorsOfScaleAndFloor) {

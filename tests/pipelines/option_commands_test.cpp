@@ -157,8 +157,15 @@ TEST_F(ImageCommands, NameTheirOptions) {
             "--plateau-density: must be above 0 and at most 1.1547005383792515 (close packing), got 1.1548");
   EXPECT_EQ(refused(with({"--amplitude", "2 mm", "--frequency", "20 Hz", "--initial-height", "0"})),
             "--initial-height: must be above 0, got 0");
-  EXPECT_EQ(refused(with({"--budget", "5 %", "--frame-rate", "100 Hz"})),
-            "--budget: velocities need successive frames, so it cannot be combined with --frame-rate");
+  for (const bool preview : {false, true}) {  // which refuses what the run after it would
+    const auto budget = [&](std::vector<std::string> more) {
+      if (preview) more.emplace_back("--preview");
+      return refused(with(more));
+    };
+    EXPECT_EQ(budget({"--budget", "5 %", "--frame-rate", "100 Hz"}),
+              "--budget: velocities need successive frames, so it cannot be combined with --frame-rate");
+    EXPECT_THAT(budget({"--budget", "5 m"}), testing::StartsWith("--budget: "));
+  }
   EXPECT_EQ(refused({"fit-images", "none.png", "--diameter", "3 mm"}, 4), "there is no file or folder \"none.png\"");
 }
 
