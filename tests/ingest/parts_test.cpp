@@ -143,13 +143,14 @@ void lay_gravel(GrayFrame& frame, const Box& box) {
   for (int stone = 0; stone < 16000; ++stone) {
     const double x = box.from_x + part(random) * (box.to_x - box.from_x), y = part(random) * frame.height;
     const double wide = 3 + 10 * part(random), high = 3 + 10 * part(random), turn = 3.14 * part(random);
+    const double along = std::cos(turn), across = std::sin(turn);
     const auto shade = static_cast<float>(60 + 130 * part(random));
     for (int row = std::max(0, static_cast<int>(y - 13)); row < std::min(frame.height, static_cast<int>(y + 14)); ++row)
       for (int column = std::max(static_cast<int>(box.from_x), static_cast<int>(x - 13));
            column < std::min(frame.width, static_cast<int>(x + 14)); ++column) {
-        const double u = (column - x) * std::cos(turn) + (row - y) * std::sin(turn);
-        const double v = (row - y) * std::cos(turn) - (column - x) * std::sin(turn);
-        if (std::hypot(u / wide, v / high) < 1)
+        const double u = ((column - x) * along + (row - y) * across) / wide;
+        const double v = ((row - y) * along - (column - x) * across) / high;
+        if (u * u + v * v < 1)
           frame.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) +
                        static_cast<std::size_t>(column)] = shade;
       }
