@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "pipelines/formats/duration.hpp"
 #include "pipelines/formats/files.hpp"
@@ -56,11 +59,10 @@ class FrameBudget {
       return {1, {}, record_of({1, all, 0, 0, true}, {}, all)};
     }
     FramePilot pilot;
-    const Run few = run_pilot(all, few_frames, {}), more = run_pilot(all, pilot_frames, {});
+    const Run few = good(run_pilot(all, few_frames, {})), more = good(run_pilot(all, pilot_frames, {}));
     pilot.frames = more.frames;
     pilot.error = more.found.error.value_or(0);
     cost_of_frames(few.frames, few.seconds, more.frames, more.seconds, pilot);
-    spent_ = few.seconds + more.seconds;
     FrameChoice choice = choose_frames(pilot, all, left());
     if (coarser_may_gain(choice, all, left())) try_coarser(more, all, pilot, choice);
     say(choice, pilot, all);
@@ -75,6 +77,7 @@ class FrameBudget {
     std::uint64_t frames = 0;
     double seconds = 0;
     Found found;
+    std::string failure;
   };
   struct Coarser {
     std::uint64_t reduction;
@@ -91,35 +94,31 @@ class FrameBudget {
   void try_coarser(const Run& fine, std::uint64_t all, FramePilot& pilot, FrameChoice& choice) {
     const std::uint64_t reduction = coarsest_reduction(fine.found.radius_px, fine.found.reduction);
     if (reduction == fine.found.reduction || !fine.found.temperature) return;
-    const std::optional<Run> coarse = run_if_possible(all, reduction);
-    if (!coarse || !coarse->found.error) return;
-    spent_ += coarse->seconds;
-    if (coarse->found.reduction != reduction) return;  // a change of --set decides
-    FramePilot its = pilot;
-    its.error = *coarse->found.error;
-    its.fixed_seconds = std::min(pilot.fixed_seconds, coarse->seconds);
-    its.seconds_per_frame = (coarse->seconds - its.fixed_seconds) / static_cast<double>(coarse->frames);
-    const double shift = std::abs(*coarse->found.temperature / *fine.found.temperature - 1);
-    const FrameChoice chosen = choose_frames(its, all, left());
+    const Run coarse = run_pilot(all, pilot_frames, reduction);
     choice = choose_frames(pilot, all, left());
+    if (!coarse.failure.empty() || !coarse.found.error) return;  // beads are not seen by so few pixels
+    if (coarse.found.reduction != reduction) return;             // a change of --set decides
+    FramePilot its = pilot;
+    its.error = *coarse.found.error;
+    its.fixed_seconds = std::min(pilot.fixed_seconds, coarse.seconds);
+    its.seconds_per_frame = (coarse.seconds - its.fixed_seconds) / static_cast<double>(coarse.frames);
+    const double shift = std::abs(*coarse.found.temperature / *fine.found.temperature - 1);
+    const FrameChoice chosen = choose_frames(its, all, left());
     if (!coarser_is_better(choice, chosen, shift, request_.budget)) return;
     pilot = its, choice = chosen, coarser_ = Coarser{reduction, shift};
   }
 
-  // Nothing where the beads are not seen by so few pixels.
-  std::optional<Run> run_if_possible(std::uint64_t all, std::uint64_t reduction) {
-    try {
-      return run_pilot(all, pilot_frames, reduction);
-    } catch (const StageError&) {
-      return std::nullopt;
-    }
+  static Run good(Run run) {
+    if (!run.failure.empty()) throw StageError(run.failure);
+    return run;
   }
 
+  // What it took is spent, also where it fails.
   Run run_pilot(std::uint64_t all, std::uint64_t frames, std::optional<std::uint64_t> reduction) {
     const std::uint64_t stride = all / frames;
     const Plan plan = request_.plan(stride, reduction);
     const std::string name = fmt::format("every-{}", stride) + (reduction ? fmt::format("-by-{}", *reduction) : "");
-    Run run{request_.out / ".pilot" / name, (all + stride - 1) / stride, 0, {}};
+    Run run{request_.out / ".pilot" / name, (all + stride - 1) / stride, 0, {}, {}};
     RunOptions options;
     options.out = run.out;
     options.until = "fit";
@@ -131,15 +130,20 @@ class FrameBudget {
     remove_leftovers(run.out);
     RunOutcome outcome;
     outcome.out = run.out;
+    const auto began = std::chrono::steady_clock::now();
     run_stages(plan, options, nullptr, outcome);
     console_.end_progress();
     if (outcome.code == exit_interrupted) throw Interrupted();
-    if (outcome.code != exit_ok)
-      throw StageError(
-          fmt::format("the pilot run of --budget, with {} of {} frames, failed: {}", run.frames, all, outcome.error));
-    for (const StageOutcome& stage : outcome.stages)
-      if (stage.cost) run.seconds += stage.cost->wall_seconds;
-    run.found = found_below(run.out);
+    if (outcome.code == exit_ok) {
+      for (const StageOutcome& stage : outcome.stages)  // of an earlier run, too
+        if (stage.cost) run.seconds += stage.cost->wall_seconds;
+      run.found = found_below(run.out);
+    } else {
+      run.failure =
+          fmt::format("the pilot run of --budget, with {} of {} frames, failed: {}", run.frames, all, outcome.error);
+      run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    }
+    spent_ += run.seconds;
     return run;
   }
 
