@@ -17,7 +17,7 @@ using namespace shakebed::pipelines;
 using shakebed::tests::ScratchFolder;
 namespace fs = std::filesystem;
 
-enum class End { well, error, killed };
+enum class End { well, error, killed, interrupted };
 
 // Counts its starts in its scratch folder; what it found there is its result.
 class Counting : public Stage {
@@ -33,6 +33,7 @@ class Counting : public Stage {
     if (end_ == End::killed) ::raise(SIGKILL);
     if (end_ == End::error) throw StageError("on purpose");
     write_file(context.output("starts.txt"), starts);
+    if (end_ == End::interrupted) ::raise(SIGINT);
   }
 
  private:
@@ -105,6 +106,17 @@ class Scratch : public testing::Test {
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     ASSERT_TRUE(WIFSIGNALED(status)) << status;
   }
+  int code_of_run_in_a_child(End end) {  // the interrupt stays on record in its process
+    const pid_t child = ::fork();
+    if (child == 0) {
+      install_interrupt_handler();
+      ::_exit(run(end, 1));
+    }
+    int status = 0;
+    EXPECT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFEXITED(status)) << status;
+    return WEXITSTATUS(status);
+  }
   std::string starts(const std::string& id = "count") { return read_file(folder_ / (id + "/starts.txt")); }
   ScratchFolder folder_;
 };
@@ -134,6 +146,14 @@ TEST_F(Scratch, OptionsTriedInBetweenDoNotCostIt) {
   run_and_be_killed(1);
   run_and_be_killed(2);
   EXPECT_EQ(run(End::well, 1), exit_ok);
+  EXPECT_EQ(starts(), "xx");
+}
+
+// Ctrl-C after a stage has last looked for it: what it wrote is not taken for its result.
+TEST_F(Scratch, OutlivesAnInterruptInTheLastMoment) {
+  EXPECT_EQ(code_of_run_in_a_child(End::interrupted), exit_interrupted);
+  EXPECT_FALSE(fs::exists(folder_ / "count"));
+  EXPECT_EQ(code_of_run_in_a_child(End::well), exit_ok);
   EXPECT_EQ(starts(), "xx");
 }
 
