@@ -197,7 +197,7 @@ void doubt_departing(PictureMaps& maps, const RimModel& model, RimsFound& found)
   for (std::size_t k = 0; k < shapes.size(); ++k)
     if (!found.disks[k].other_size) of_one_size.push_back(shapes[k]);
   const std::complex<double> shared = shared_second(of_one_size);
-  const Departing departing = departing_of(shapes, shared);
+  const Departing departing = departing_of(shapes, circles, shared);
   if (departing.most()) return;  // the survey has judged them
   const bool left_out = departing.more_than_seem();
   std::vector<RimDisk> kept;

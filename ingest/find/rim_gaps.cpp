@@ -405,7 +405,7 @@ class OtherSizes {
     if (!shared_) shared_ = shared_second(shapes_of_rims(maps_, model_, some_of(known_), known_));
     std::vector<Circle> circles;
     for (const GapCircle& one : taken) circles.push_back(one.circle);
-    return departing_of(shapes_of_rims(maps_, model_, circles, disks), *shared_).most();
+    return departing_of(shapes_of_rims(maps_, model_, circles, disks), circles, *shared_).most();
   }
 
   static std::vector<Circle> some_of(const std::vector<Circle>& circles) {
