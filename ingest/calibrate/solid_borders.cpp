@@ -198,7 +198,7 @@ std::vector<SolidBorder> find_solid_borders(const GrayFrame& frame) {
   if (!tolerance) return borders;
   GrayFrame left = frame;
   // Twice: a corner of a frame around the bed is understood once the sides next to it are.
-  for (int round = 0; round < 2; ++round)
+  for (int round = 0; round < 2 && (round == 0 || !borders.empty()); ++round)
     for (const FrameSide side : {FrameSide::bottom, FrameSide::left, FrameSide::right, FrameSide::top}) {
       if (std::any_of(borders.begin(), borders.end(), [&](const SolidBorder& b) { return b.side == side; })) continue;
       const View view{left, side};

@@ -137,43 +137,25 @@ CircleHypothesis weigh(const Found& found, double radius, double range, double f
   return best;
 }
 
+// Whether circles are so many, and so much of all edges, that finer levels show but parts of them.
+bool makes_up_the_picture(const CircleHypothesis& one) {
+  constexpr double most_of_the_edges = 0.4, hardly_by_chance = 0.02, many = 50;
+  return one.explained_share >= most_of_the_edges && one.circles >= many &&
+         one.by_chance <= hardly_by_chance * one.circles;
+}
+
 class Census {
  public:
   explicit Census(const CensusOptions& options) : options_(options) {}
 
+  // From the coarsest level on, until one of them shows what makes up the picture.
   void search(std::size_t channel, const GrayFrame& frame) {
     const double range = range_of(frame);
-    for (const ScaledPicture& level : pyramid_of(frame, options_)) {
-      const EdgeMap edges = edges_of(level);
-      const EdgeMap one = edges_of_stretched(level.picture, decoy_stretch, 0, edges.threshold);
-      const EdgeMap other = edges_of_stretched(level.picture, decoy_stretch, std::numbers::pi / 4, edges.threshold);
-      const RadiusRange range_of_radii = radii_at(level.scale, options_);
-      const bool tiny = std::min(level.picture.width, level.picture.height) < room_for_two;
-      for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
-        if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
-        const auto circles = [&](const EdgeMap& map) {
-          return find_circles(map, {smallest_at_level, largest_at_level, polarity, faintest_census_support});
-        };
-        const Found found{circles(edges), {circles(one), circles(other)}};
-        for (double radius = range_of_radii.from; radius < range_of_radii.to; radius *= 1.05) {
-          double by_chance = 0;
-          CircleHypothesis hypothesis = weigh(found, radius, range, tiny ? few_asked : least_asked, &by_chance);
-          census_.best_by_chance_px = std::max(census_.best_by_chance_px, by_chance * level.scale);
-          if (!(hypothesis.gain_px > 0)) continue;
-          hypothesis.channel = channel;
-          hypothesis.polarity = polarity;
-          hypothesis.explained_share =
-              hypothesis.gain_px / static_cast<double>(std::max<std::size_t>(1, edges.ridge.size()));
-          hypothesis.radius_px *= level.scale;
-          hypothesis.gain_px *= level.scale;
-          for (Circle& circle : hypothesis.seen) {
-            circle.x = level.to_frame_x(circle.x);
-            circle.y = level.to_frame_y(circle.y);
-            circle.radius *= level.scale;
-          }
-          all_.push_back(std::move(hypothesis));
-        }
-      }
+    const std::vector<ScaledPicture> levels = pyramid_of(frame, options_);
+    for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
+      const std::size_t before = all_.size();
+      search_level(channel, *level, range);
+      if (std::any_of(all_.begin() + static_cast<std::ptrdiff_t>(before), all_.end(), makes_up_the_picture)) return;
     }
   }
 
@@ -192,6 +174,39 @@ class Census {
   }
 
  private:
+  void search_level(std::size_t channel, const ScaledPicture& level, double range) {
+    const EdgeMap edges = edges_of(level);
+    const EdgeMap one = edges_of_stretched(level.picture, decoy_stretch, 0, edges.threshold);
+    const EdgeMap other = edges_of_stretched(level.picture, decoy_stretch, std::numbers::pi / 4, edges.threshold);
+    const RadiusRange range_of_radii = radii_at(level.scale, options_);
+    const bool tiny = std::min(level.picture.width, level.picture.height) < room_for_two;
+    for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
+      if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
+      const auto circles = [&](const EdgeMap& map) {
+        return find_circles(map, {smallest_at_level, largest_at_level, polarity, faintest_census_support});
+      };
+      const Found found{circles(edges), {circles(one), circles(other)}};
+      for (double radius = range_of_radii.from; radius < range_of_radii.to; radius *= 1.05) {
+        double by_chance = 0;
+        CircleHypothesis hypothesis = weigh(found, radius, range, tiny ? few_asked : least_asked, &by_chance);
+        census_.best_by_chance_px = std::max(census_.best_by_chance_px, by_chance * level.scale);
+        if (!(hypothesis.gain_px > 0)) continue;
+        hypothesis.channel = channel;
+        hypothesis.polarity = polarity;
+        hypothesis.explained_share =
+            hypothesis.gain_px / static_cast<double>(std::max<std::size_t>(1, edges.ridge.size()));
+        hypothesis.radius_px *= level.scale;
+        hypothesis.gain_px *= level.scale;
+        for (Circle& circle : hypothesis.seen) {
+          circle.x = level.to_frame_x(circle.x);
+          circle.y = level.to_frame_y(circle.y);
+          circle.radius *= level.scale;
+        }
+        all_.push_back(std::move(hypothesis));
+      }
+    }
+  }
+
   CensusOptions options_;
   CircleCensus census_;
   std::vector<CircleHypothesis> all_;

@@ -69,18 +69,23 @@ DrawingSigns signs_of_drawing(const GrayFrame& frame) {
   const auto width = static_cast<std::size_t>(frame.width), height = static_cast<std::size_t>(frame.height);
   RuledEdges rows(height - 1, width), columns(width - 1, height);
   std::size_t flat = 0, shaded_flat = 0, faint = 0;
+  std::vector<float> lowest(width), highest(width);  // of three rows
   for (std::size_t row = 1; row < height; ++row) {
     const float* above = frame.pixels.data() + (row - 1) * width;
     const float* here = above + width;
     const float* below = row + 1 < height ? here + width : here;
+    for (std::size_t k = 0; k < width; ++k) {
+      lowest[k] = std::min(std::min(above[k], here[k]), below[k]);
+      highest[k] = std::max(std::max(above[k], here[k]), below[k]);
+    }
     for (std::size_t k = 1; k < width; ++k) {
       const bool same_above = above[k] == above[k - 1], same_here = here[k] == here[k - 1];
       rows.take(row - 1, same_above && same_here && std::abs(here[k] - above[k]) >= faint_step);
       columns.take(k - 1,
                    above[k] == here[k] && above[k - 1] == here[k - 1] && std::abs(here[k] - here[k - 1]) >= faint_step);
       if (row + 1 == height || k + 1 == width) continue;
-      const auto [low, high] = std::minmax({above[k - 1], above[k], above[k + 1], here[k - 1], here[k], here[k + 1],
-                                            below[k - 1], below[k], below[k + 1]});
+      const float low = std::min(std::min(lowest[k - 1], lowest[k]), lowest[k + 1]);
+      const float high = std::max(std::max(highest[k - 1], highest[k]), highest[k + 1]);
       flat += high == low;
       if (here[k] < darkest_level || here[k] > brightest_level) continue;
       shaded_flat += high == low;

@@ -121,8 +121,7 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
 // whichever are more.
 double share_missed(const GrayFrame& frame, const RimModel& rims, const std::vector<Circle>& found, double by_rims,
                     const std::optional<PixelRectangle>& region) {
-  const double missed = std::max(by_rims, expected_missed_beads(frame, rims, found, region));
-  return missed / std::max(1.0, static_cast<double>(found.size()) + missed);
+  return share_of_missed(std::max(by_rims, expected_missed_beads(frame, rims, found, region)), found.size());
 }
 
 struct Agreement {
@@ -159,17 +158,18 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   }
   const std::vector<Circle> circles = rims_at(frame, rims.model, places);
   const std::vector<Standing> standing = standing_of(places, circles);
+  std::vector<Circle> seen_rims;  // of the faces
   double rimless = 0;
   for (std::size_t k = 0; k < places.size(); ++k) {
     const bool stands = standing[k] == Standing::has_rim || standing[k] == Standing::among_beads;
-    if (stands) agreement.faces.push_back(places[k]);
+    if (stands) agreement.faces.push_back(places[k]), seen_rims.push_back(circles[k]);
     if (standing[k] == Standing::alone) agreement.no_rim.push_back(places[k]);
     rimless += stands ? 0 : 1;
   }
   if (!places.empty()) agreement.rimless = rimless / static_cast<double>(places.size());
   PictureMaps maps(frame, rims.model.search.wanted_px);
   const std::vector<RimShape> shapes = shapes_of_rims(maps, rims.model, agreement.faces, agreement.all);
-  const Departing departing = departing_of(shapes, shared_second(shapes));
+  const Departing departing = departing_of(shapes, seen_rims, shared_second(shapes));
   agreement.not_round = departing.more_than_seem() && !departing.most();  // most: the survey has judged them
   return agreement;
 }
@@ -330,8 +330,8 @@ double share_missed_of(const GrayFrame& frame, const RimModel& model, const Rims
   // Where things lie that are no beads, none are missed.
   std::vector<Circle> taken = not_round_of(model, seen);
   for (const RimDisk& disk : seen.disks) taken.push_back(disk.circle);
-  const double missed = std::max(seen.expected_missed, expected_missed_beads(frame, model, taken, region));
-  return missed / std::max(1.0, static_cast<double>(seen.disks.size()) + missed);
+  return share_of_missed(std::max(seen.expected_missed, expected_missed_beads(frame, model, taken, region)),
+                         seen.disks.size());
 }
 
 FoundDisk found_disk(const RimDisk& rim, const FinderCalibration& calibration, const FindOptions& options) {

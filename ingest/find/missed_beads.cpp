@@ -252,4 +252,8 @@ double expected_missed_beads(const GrayFrame& frame, const RimModel& model, cons
   return missed;
 }
 
+double share_of_missed(double missed, std::size_t found) {
+  return missed / std::max(1.0, static_cast<double>(found) + missed);
+}
+
 }  // namespace shakebed::ingest

@@ -5,6 +5,7 @@
 // search leaves voids, where no bead fits, and background, where no edges are. Straight edges of a container fill too
 // few of a place's directions.
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -17,5 +18,8 @@ namespace shakebed::ingest {
 // looked for, and count by their areas.
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region);
+
+// Of all beads, the share of those missed.
+double share_of_missed(double missed, std::size_t found);
 
 }  // namespace shakebed::ingest

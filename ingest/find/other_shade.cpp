@@ -164,7 +164,7 @@ bool mostly_not_round(const GrayFrame& frame, const RimModel& first, const RimMo
   all.insert(all.end(), more.begin(), more.end());
   PictureMaps maps(frame, quick_search.wanted_px);
   const std::complex<double> shared = shared_second(shapes_of_rims(maps, first, beads, all));
-  return departing_of(shapes_of_rims(maps, other, more, all), shared).most();
+  return departing_of(shapes_of_rims(maps, other, more, all), more, shared).most();
 }
 
 // Median over the disks of the mean level inside, by level_at(column, row) of pixels that are seen.
@@ -240,8 +240,8 @@ void merge(FindResult more, double contrast, const FinderCalibration& first, Fin
 void count_missed(const GrayFrame& frame, const FindOptions& options, FinderCalibration& calibration,
                   const FindResult& found) {
   const std::vector<Circle> circles = circles_of(found.disks);
-  const double missed = expected_missed_beads(frame, *calibration.rims, circles, options.roi);
-  calibration.expected_missed = missed / std::max(1.0, static_cast<double>(circles.size()) + missed);
+  calibration.expected_missed =
+      share_of_missed(expected_missed_beads(frame, *calibration.rims, circles, options.roi), circles.size());
 }
 
 }  // namespace

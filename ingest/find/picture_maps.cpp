@@ -1,5 +1,6 @@
 #include "ingest/find/picture_maps.hpp"
 
+#include <algorithm>
 #include <numbers>
 #include <utility>
 
@@ -7,18 +8,55 @@
 
 namespace shakebed::ingest {
 
+namespace {
+
+// Twice each direction, so that what lies at the bottom of a picture is stretched in all of them.
+constexpr std::size_t bands_of_copy = 2 * stretching_directions;
+// px: the largest radius on a map, 16 px times the largest of a group of sizes over its mean, and where its rim is
+// looked for.
+constexpr int band_margin = 32;
+
+StretchedBand band_of(const PictureMap& map, double angle, int from, int to) {
+  const int height = map.at.picture.height;
+  StretchedBand band;
+  band.angle = angle;
+  band.first_row = std::max(0, from - band_margin);
+  band.from = from - band.first_row, band.to = to - band.first_row;
+  band.edges = edges_of_stretched(map.at.picture, decoy_stretch, angle, map.edges.threshold, band.first_row,
+                                  std::min(height, to + band_margin) - band.first_row);
+  return band;
+}
+
+std::vector<StretchedCopy> copies_of(const PictureMap& map) {
+  const int height = map.at.picture.height;
+  const bool large = map.at.picture.pixels.size() > copied_in_bands_px;
+  std::vector<StretchedCopy> copies(large ? 1 : stretching_directions);
+  const std::size_t bands = large ? bands_of_copy : 1;
+  const auto row = [&](std::size_t band) { return static_cast<int>(static_cast<std::size_t>(height) * band / bands); };
+  for (std::size_t copy = 0; copy < copies.size(); ++copy)
+    for (std::size_t band = 0; band < bands; ++band)
+      copies[copy].push_back(band_of(map, copy_angle((copy + band) % stretching_directions), row(band), row(band + 1)));
+  return copies;
+}
+
+}  // namespace
+
 double copy_angle(std::size_t copy) {
-  return static_cast<double>(copy) * std::numbers::pi / static_cast<double>(stretched_copies);
+  return static_cast<double>(copy) * std::numbers::pi / static_cast<double>(stretching_directions);
 }
 
 EdgeMap edges_of(const ScaledPicture& at, float threshold) {
   return find_edges(at.picture, threshold, at.scale < 1 ? Pixels::doubled : Pixels::own);
 }
 
-EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold) {
+EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold, int first_row,
+                           int rows) {
   StretchedLines lines(picture, ratio, angle);
   return find_edges(
-      picture.width, picture.height, [&](int row) { return lines.line(row); }, threshold);
+      picture.width, rows, [&](int row) { return lines.line(first_row + row); }, threshold);
+}
+EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold) {
+  return edges_of_stretched(picture, ratio, angle, threshold, 0, picture.height);
 }
 
 PictureMaps::One& PictureMaps::made_for(double radius_px, float threshold) {
@@ -37,8 +75,7 @@ const PictureMap& PictureMaps::scaled_for(double radius_px, float threshold) {
 
 const PictureMap& PictureMaps::with_copies(double radius_px, float threshold) {
   PictureMap& map = made_for(radius_px, threshold).map;
-  for (std::size_t k = map.copies.size(); k < stretched_copies; ++k)
-    map.copies.push_back(edges_of_stretched(map.at.picture, decoy_stretch, copy_angle(k), map.edges.threshold));
+  if (map.copies.empty()) map.copies = copies_of(map);
   return map;
 }
 

@@ -10,21 +10,38 @@
 
 namespace shakebed::ingest {
 
+// Rows of a stretched copy of a picture.
+struct StretchedBand {
+  double angle = 0;      // in which the copy is stretched
+  int first_row = 0;     // of the copy
+  int from = 0, to = 0;  // rows of the band in which the centres of its circles are, without its margins
+  EdgeMap edges;         // of the band with its margins
+  [[nodiscard]] bool holds(double row) const { return row >= from - 0.5 && row < to - 0.5; }
+};
+// All rows, in one band or in several that are stretched in different directions.
+using StretchedCopy = std::vector<StretchedBand>;
+
 struct PictureMap {
   ScaledPicture at;
   EdgeMap edges;
-  std::vector<EdgeMap> copies;  // stretched, once asked for; see copy_angle()
+  std::vector<StretchedCopy> copies;  // once asked for
 };
 
 // Directions in which the copies are stretched: four, so that what is oval in one of them is round in another.
-inline constexpr std::size_t stretched_copies = 4;
+inline constexpr std::size_t stretching_directions = 4;
 double copy_angle(std::size_t copy);
+
+// Of a map of so many pixels there are four copies, one in each direction. Of a larger one, which shows many more
+// circles, there is one: bands in all four directions by turns.
+inline constexpr std::size_t copied_in_bands_px = 2'000'000;
 
 // At any scale; `threshold` as in find_edges().
 EdgeMap edges_of(const ScaledPicture& at, float threshold = 0);
 
-// Of a copy.
+// Of a copy, or of some of its rows.
 EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold);
+EdgeMap edges_of_stretched(const GrayFrame& picture, double ratio, double angle, float threshold, int first_row,
+                           int rows);
 
 // The frame must outlive it; not for several threads at once.
 class PictureMaps {

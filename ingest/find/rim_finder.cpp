@@ -78,12 +78,16 @@ void measure_rims(const std::vector<Circle>& circles, double scale, RimModel& mo
   model.contrast = median_of(contrasts);
 }
 
+Circle in_the_frame(Circle circle, const ScaledPicture& at) {
+  circle.x = at.to_frame_x(circle.x);
+  circle.y = at.to_frame_y(circle.y);
+  circle.radius *= at.scale;
+  return circle;
+}
+
 RimDisk disk_of(const Circle& circle, const ScaledPicture& at, const RimModel& model) {
   RimDisk disk;
-  disk.circle = circle;
-  disk.circle.x = at.to_frame_x(circle.x);
-  disk.circle.y = at.to_frame_y(circle.y);
-  disk.circle.radius = circle.radius * at.scale;
+  disk.circle = in_the_frame(circle, at);
   disk.probability = model.probability_of(circle.support);
   const double apart = 2 * std::numbers::pi * circle.radius / correlated_px;
   const double met = std::max(3.0, circle.support * std::min(apart, static_cast<double>(circle.rays)));
@@ -178,7 +182,12 @@ LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known)
     radius = model.radius_px / at.scale;
     circles = circles_of(edges, radius, model);
     std::vector<std::vector<Circle>> by_chance;
-    for (const EdgeMap& copy : copies) by_chance.push_back(circles_of(copy, radius, model));
+    for (const StretchedCopy& copy : copies) {
+      by_chance.emplace_back();
+      for (const StretchedBand& band : copy)
+        for (const Circle& circle : circles_of(band.edges, radius, model))
+          if (band.holds(circle.y)) by_chance.back().push_back(circle);
+    }
     model.probability = probabilities_by_support(circles, by_chance, known);
     measure_rims(circles, at.scale, model);
   }
@@ -197,7 +206,7 @@ void doubt_departing(PictureMaps& maps, const RimModel& model, RimsFound& found)
   for (std::size_t k = 0; k < shapes.size(); ++k)
     if (!found.disks[k].other_size) of_one_size.push_back(shapes[k]);
   const std::complex<double> shared = shared_second(of_one_size);
-  const Departing departing = departing_of(shapes, shared);
+  const Departing departing = departing_of(shapes, circles, shared);
   if (departing.most()) return;  // the survey has judged them
   const bool left_out = departing.more_than_seem();
   std::vector<RimDisk> kept;
@@ -237,6 +246,15 @@ LearnedRims learn_rims(PictureMaps& maps, Polarity polarity, double radius_px, K
   return learned;
 }
 
+std::vector<Circle> circles_seen(PictureMaps& maps, Polarity polarity, double radius_px) {
+  RimModel model;
+  model.polarity = polarity;
+  const auto& [at, edges, copies] = maps.scaled_for(radius_px);
+  std::vector<Circle> circles = circles_of(edges, radius_px / at.scale, model);
+  for (Circle& circle : circles) circle = in_the_frame(circle, at);
+  return circles;
+}
+
 void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size) {
   PictureMaps maps(frame, learned.model.search.wanted_px);
   learn_gaps(maps, learned, one_size);
@@ -249,11 +267,16 @@ void learn_gaps(PictureMaps& maps, LearnedRims& learned, bool one_size) {
 }
 
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks) {
+  PictureMaps maps(frame, quick_search.wanted_px);
+  return roundness_of(maps, model, disks);
+}
+
+Roundness roundness_of(PictureMaps& maps, const RimModel& model, const std::vector<RimDisk>& disks) {
   if (disks.empty()) return {};
   // Corners show at twice the resolution that circles are searched at.
-  const double radius = scaled_for(frame, model.radius_px).scale < 2 ? model.radius_px : 0.5 * model.radius_px;
-  const ScaledPicture at = scaled_for(frame, radius);
-  Roundness roundness = roundness_of(edges_of(at), on_the_map(disks, at), model.polarity);
+  const double radius = scale_for(model.radius_px) < 2 ? model.radius_px : 0.5 * model.radius_px;
+  const auto& [at, edges, copies] = maps.scaled_for(radius);
+  Roundness roundness = roundness_of(edges, on_the_map(disks, at), model.polarity);
   if (auto& side = roundness.round_side; side)
     side->at = side->left_or_right ? at.to_frame_x(side->at) : at.to_frame_y(side->at);
   return roundness;

@@ -84,8 +84,12 @@ LearnedRims learn_rims(const GrayFrame& frame, Polarity polarity, double radius_
 LearnedRims learn_rims(PictureMaps& maps, Polarity polarity, double radius_px, Known known = Known::nothing,
                        const RimSearch& search = quick_search);
 
+// The circles from which learn_rims() starts, px of the frame, whatever chance makes of them.
+std::vector<Circle> circles_seen(PictureMaps& maps, Polarity polarity, double radius_px);
+
 // Whether the outlines of the disks are round.
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks);
+Roundness roundness_of(PictureMaps& maps, const RimModel& model, const std::vector<RimDisk>& disks);
 
 // Looks again beside the beads found: chance makes up few circles there, so poorer rims are enough. Beads of other
 // sizes are looked for unless `one_size`.

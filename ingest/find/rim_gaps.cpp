@@ -50,6 +50,7 @@ struct GapMap {
   const EdgeMap& edges;
   double scale = 1;  // px of the frame a px of the map
   ToFrame to_frame;
+  const StretchedBand* band = nullptr;  // of a copy
 };
 
 bool within(double radius, const SizeBand& band) { return radius >= band.from_px && radius <= band.to_px; }
@@ -170,6 +171,7 @@ class GapSearch {
   }
 
   void add(Circle circle) {
+    if (map_.band != nullptr && !map_.band->holds(circle.y)) return;
     circle.radius *= map_.scale;
     if (!within(circle.radius, band_) || !is_wanted(circle.radius)) return;
     const auto [x, y] = map_.to_frame(circle.x, circle.y);
@@ -226,41 +228,56 @@ SizeBand around(double radius_px) {
 }
 
 GapMap map_of(const PictureMap& map) {
-  return {map.edges, map.at.scale, [&map](double x, double y) {
+  return {map.edges, map.at.scale,
+          [&map](double x, double y) {
             return FramePlace{map.at.to_frame_x(x), map.at.to_frame_y(y)};
-          }};
+          },
+          nullptr};
 }
 
 // A search in the picture and the same in its copies.
 struct WithCopies {
   GapSearch picture;
-  std::vector<GapSearch> copies;
+  std::vector<std::vector<GapSearch>> copies;  // of each its bands
 
   WithCopies(PictureMaps& maps, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
       : WithCopies(maps.with_copies(std::sqrt(band.from_px * band.to_px), model.threshold), band, model, beads) {}
 
-  [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) {
+  // Of each copy.
+  [[nodiscard]] std::vector<std::vector<Circle>> by_chance_beside(const std::vector<Circle>& beads) {
     std::vector<std::vector<Circle>> by_chance;
-    for (GapSearch& copy : copies) by_chance.push_back(copy.beside(beads));
-    return probabilities_by_support(picture.beside(beads), by_chance, Known::beads);
+    for (std::vector<GapSearch>& copy : copies) {
+      by_chance.emplace_back();
+      for (GapSearch& band : copy)
+        for (const Circle& circle : band.beside(beads)) by_chance.back().push_back(circle);
+    }
+    return by_chance;
+  }
+  [[nodiscard]] std::vector<double> probabilities(const std::vector<Circle>& beads) {
+    return probabilities_by_support(picture.beside(beads), by_chance_beside(beads), Known::beads);
   }
   template <class Change>
   void change(const Change& change) {
     change(picture);
-    for (GapSearch& copy : copies) change(copy);
+    for (std::vector<GapSearch>& copy : copies)
+      for (GapSearch& one : copy) change(one);
   }
 
  private:
   WithCopies(const PictureMap& map, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
       : picture(map_of(map), band, model, beads) {
-    for (std::size_t k = 0; k < map.copies.size(); ++k)
-      copies.emplace_back(GapMap{map.copies[k], map.at.scale,
-                                 [&map, k](double x, double y) {
-                                   const auto [u, v] =
-                                       place_before_stretching(map.at.picture, decoy_stretch, copy_angle(k), x, y);
-                                   return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
-                                 }},
-                          band, model, beads);
+    for (const StretchedCopy& copy : map.copies) {
+      copies.emplace_back();
+      for (const StretchedBand& rows : copy)
+        copies.back().emplace_back(GapMap{rows.edges, map.at.scale,
+                                          [&map, &rows](double x, double y) {
+                                            const auto [u, v] = place_before_stretching(
+                                                map.at.picture, decoy_stretch, rows.angle, x, y + rows.first_row);
+                                            return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
+                                          },
+                                          &rows},
+                                   band, model, beads);
+    }
   }
 };
 
@@ -336,7 +353,7 @@ class OtherSizes {
     for (Group& group : groups_) {
       Seen seen;
       seen.picture = group.search.picture.beside(known_);
-      for (GapSearch& copy : group.search.copies) seen.copies.push_back(copy.beside(known_));
+      seen.copies = group.search.by_chance_beside(known_);
       for (double radius = group.band.from_px; radius < group.band.to_px; radius *= size_step) {
         const SizeBand band = around(radius);
         double gain = gain_near(seen.picture, band);
@@ -405,7 +422,7 @@ class OtherSizes {
     if (!shared_) shared_ = shared_second(shapes_of_rims(maps_, model_, some_of(known_), known_));
     std::vector<Circle> circles;
     for (const GapCircle& one : taken) circles.push_back(one.circle);
-    return departing_of(shapes_of_rims(maps_, model_, circles, disks), *shared_).most();
+    return departing_of(shapes_of_rims(maps_, model_, circles, disks), circles, *shared_).most();
   }
 
   static std::vector<Circle> some_of(const std::vector<Circle>& circles) {

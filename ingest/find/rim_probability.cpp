@@ -15,9 +15,10 @@ constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
 constexpr std::size_t near_classes = 4;
 // Share of their rims from which circles are seen whole. Clutter that leaves gaps does not close them.
 constexpr double seen_whole = 0.9;
-// Of a class of so many whole circles, none of which is seen in four copies, chance makes up less than 0.75 in the
-// picture (at 95 %, by Poisson's law): a share that is small whatever the classes below hold.
-constexpr double many_whole = 20, share_of_few = 0.05;
+// Of a class of so many whole circles, over the number of copies, none of which is seen in the copies, chance makes up
+// less than 3 over that number in the picture (at 95 %, by Poisson's law): a share that is small whatever the classes
+// below hold.
+constexpr double many_whole = 80, share_of_few = 0.05;
 
 // Circles of one class of support, in the frame and (the mean) in its copies.
 struct SupportClass {
@@ -25,7 +26,9 @@ struct SupportClass {
   std::size_t classes = 1;   // that were put together
   bool joined_near = false;  // the classes just below it that have no circle
   [[nodiscard]] bool whole() const { return here > 0 && support_sum >= seen_whole * here; }
-  [[nodiscard]] bool many() const { return whole() && here >= many_whole && chance <= share_of_few * here; }
+  [[nodiscard]] bool many(std::size_t copies) const {
+    return whole() && here * static_cast<double>(copies) >= many_whole && chance <= share_of_few * here;
+  }
   [[nodiscard]] double doubt() const { return here > 0 ? chance / here : chance > 0 ? HUGE_VAL : 0; }
 };
 
@@ -63,7 +66,7 @@ std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
       const bool below_says_something = below.here > 0 || (known == Known::beads && below.chance > 0);
       if (below_says_something && above.here > 0 && below.doubt() >= above.doubt()) break;
       if ((known == Known::radius || (known == Known::wide && above.whole()) ||
-           (known == Known::fairly_wide && above.many())) &&
+           (known == Known::fairly_wide && above.many(copies.size()))) &&
           below.here == 0 && below.chance > 0 && above.here > 0 && below.classes > near_classes) {
         if (!above.joined_near) join_near(classes, k + 1 - above.classes, below, above);
         break;

@@ -15,9 +15,10 @@ enum class Known { nothing, fairly_wide, wide, radius, beads };
 // The probability for support 0, 1/20, 2/20 .. 1 (the visible share of the rim). `copies`: the circles of each copy. A
 // class of support without a circle is joined to the next better one, which lowers that one's probability. Where the
 // radius is known, only classes at most 0.2 below are joined: half of a large oval passes as a poor small circle. So it
-// is with wide circles seen nearly whole, since clutter closes no rim, and with twenty of them that are fairly wide.
-// Where beads are known most classes are empty, and they stay separate. The probability never falls with the support:
-// neighbouring classes that violate this are pooled (isotonic regression [Barlow]).
+// is with wide circles seen nearly whole, since clutter closes no rim, and with many of them that are fairly wide: 20
+// beside four copies, 80 beside one. Where beads are known most classes are empty, and they stay separate. The
+// probability never falls with the support: neighbouring classes that violate this are pooled (isotonic regression
+// [Barlow]).
 std::vector<double> probabilities_by_support(const std::vector<Circle>& seen,
                                              const std::vector<std::vector<Circle>>& copies,
                                              Known known = Known::nothing);

@@ -33,13 +33,16 @@ bool departs_from_round(const RimShape& shape, std::complex<double> shared);
 // How many of the shapes that could be measured depart.
 struct Departing {
   std::size_t measured = 0, departing = 0;
+  double seemingly = 0;  // share of round ones that depart by chance
   [[nodiscard]] bool most() const { return 2 * departing > measured; }
   // More than errors make of round ones, at least twice as many, and a few.
   [[nodiscard]] bool more_than_seem() const;
   // The probability that one of those that depart is round nevertheless.
   [[nodiscard]] double round_nevertheless() const;
 };
-Departing departing_of(const std::vector<RimShape>& shapes, std::complex<double> shared);
+// `circles`: those of the shapes. Where little of the round ones' rims is seen, other things cover them.
+Departing departing_of(const std::vector<RimShape>& shapes, const std::vector<Circle>& circles,
+                       std::complex<double> shared);
 
 // Of circles that were left out: a warning. `recorded_px`: as in FindOptions.
 std::string left_out_as_not_round(const std::vector<Circle>& circles, double recorded_px);

@@ -123,16 +123,23 @@ class ChannelTrials {
     return expected;
   }
 
-  // Rims in this channel, none of which lies on a disk found.
-  [[nodiscard]] double rims_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture,
-                                   Polarity polarity) const {
-    const LearnedRims rims = learn_rims(small(picture), polarity, radius_px(), Known::beads);
+  // Sure rims in this channel, none of which lies on a disk found. Where there are no more than `too_few` circles, sure
+  // or not, their number.
+  [[nodiscard]] double rims_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture, Polarity polarity,
+                                   double too_few) const {
+    const GrayFrame part = small(picture);
+    PictureMaps maps(part, quick_search.wanted_px);
+    const auto beside = [&](const Circle& circle) {
+      return std::none_of(disks.begin(), disks.end(), [&](const FoundDisk& disk) {
+        return std::hypot(disk.x_px - circle.x, disk.y_px - circle.y) < nearest_of_another * radius_px();
+      });
+    };
+    const std::vector<Circle> all = circles_seen(maps, polarity, radius_px());
+    const auto circles = static_cast<double>(std::count_if(all.begin(), all.end(), beside));
+    if (circles <= too_few) return circles;
     double sure = 0;
-    for (const RimDisk& rim : rims.disks)
-      sure +=
-          rim.probability >= sure_rim && std::none_of(disks.begin(), disks.end(), [&](const FoundDisk& disk) {
-            return std::hypot(disk.x_px - rim.circle.x, disk.y_px - rim.circle.y) < nearest_of_another * radius_px();
-          });
+    for (const RimDisk& rim : learn_rims(maps, polarity, radius_px(), Known::beads).disks)
+      sure += rim.probability >= sure_rim && beside(rim.circle);
     return sure;
   }
 
@@ -213,7 +220,8 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   double most = clearly_more * here.expected;
   for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
-    if (plain && here.expected + trials.rims_beside(here.disks, *other.frame, other.polarity) <= most) continue;
+    const double wanted = most - here.expected;
+    if (plain && trials.rims_beside(here.disks, *other.frame, other.polarity, wanted) <= wanted) continue;
     const Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
     if (there.expected <= most) continue;
     // More faces are found where other things pass as beads, too: these then are less sure.

@@ -380,7 +380,7 @@ SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis
   if (const char* why = why_drawn(asked.signs, candidate.explained_share)) candidate.why_drawn = why;
   if (candidate.why_not.empty() && !asked.options.any_shape) candidate.why_not = candidate.why_drawn;
   if (candidate.why_not.empty()) {
-    const Roundness roundness = roundness_of(picture, candidate.rims, candidate.disks);
+    const Roundness roundness = roundness_of(of.maps, candidate.rims, candidate.disks);
     judge_shape(candidate, roundness, asked.options.any_shape);
     const bool outlines_tell = candidate.rims.radius_px > coarse_px && !asked.options.any_shape && !asked.options.roi;
     if (roundness.round_side && outlines_tell)

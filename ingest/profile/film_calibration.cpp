@@ -303,8 +303,8 @@ class FilmLearner {
         circles.emplace_back();
         circles.back().x = disk.x_px, circles.back().y = disk.y_px, circles.back().radius = disk.radius_px;
       }
-    const double missed = expected_missed_beads(straight_.back(), *first.rims, circles, find_.roi);
-    first.expected_missed = missed / std::max(1.0, static_cast<double>(circles.size()) + missed);
+    first.expected_missed =
+        share_of_missed(expected_missed_beads(straight_.back(), *first.rims, circles, find_.roi), circles.size());
   }
 
   void learn_second() {

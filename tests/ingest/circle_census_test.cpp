@@ -236,5 +236,24 @@ TEST(CircleCensus, SeesTheBusiestPartOfALargePicture) {
   expect_same_census({&frame}, {Polarity::dark_beads, 6.0, 2.5}, "wide");
 }
 
+// Disks of 17 px are searched for at half the resolution, smaller ones beside them in the picture itself: only where
+// the large ones are not what makes it up.
+TEST(CircleCensus, EndsAtTheLevelWhoseCirclesMakeUpThePicture) {
+  const auto smallest_with = [](int large, int small) {
+    Camera camera;
+    camera.width = 560, camera.height = 420, camera.blur_px = 0.8;
+    std::vector<RenderedDisk> disks;
+    for (int k = 0; k < large; ++k) disks.push_back({25.3 + 42.1 * (k % 12), 25.2 + 42.3 * (k / 12), 17, 0, 0});
+    for (int k = 0; k < small; ++k) disks.push_back({530 + 14.0 * (k % 2), 12 + 14.1 * (k / 2), 6, 0, 0});
+    const GrayFrame frame = render_frame(disks, camera);
+    double smallest = HUGE_VAL;
+    for (const CircleHypothesis& one : take_census({&frame}).hypotheses)
+      if (!one.hopeless()) smallest = std::min(smallest, one.radius_px);
+    return smallest;
+  };
+  EXPECT_GT(smallest_with(96, 50), 10);
+  EXPECT_LT(smallest_with(40, 50), 7) << "forty large ones are few";
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

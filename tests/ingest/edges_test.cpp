@@ -238,8 +238,9 @@ TEST(PictureScale, MapsAreMadeOnce) {
   for (std::size_t k = 0; k < 4; ++k) {
     EXPECT_NEAR(copy_angle(k), static_cast<double>(k) * std::numbers::pi / 4, 1e-12);
     const EdgeMap edges = find_edges(stretched(frame, 1.8, copy_angle(k)), one.edges.threshold);
-    EXPECT_EQ(with.copies[k].x, edges.x);
-    EXPECT_EQ(with.copies[k].threshold, one.edges.threshold);
+    ASSERT_EQ(with.copies[k].size(), 1U);
+    EXPECT_EQ(with.copies[k].front().edges.x, edges.x);
+    EXPECT_EQ(with.copies[k].front().edges.threshold, one.edges.threshold);
   }
 }
 

@@ -9,6 +9,8 @@
 
 #include "ingest/find/circle_search.hpp"
 #include "ingest/find/edge_map.hpp"
+#include "ingest/find/picture_maps.hpp"
+#include "ingest/find/picture_scale.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/by_hand.hpp"
@@ -76,15 +78,50 @@ std::vector<Circle> seen_by_share(const std::vector<std::pair<double, int>>& cou
 // there. Many whole circles, of which no copy has one, are no chance all the same. Whole ones that copies have, too,
 // may be.
 TEST(RimProbability, OfManyWholeCirclesIsTheirOwn) {
+  std::size_t copies = 4;
   const auto of = [&](int whole, double support, int by_chance, Known known = Known::fairly_wide) {
-    return probabilities_by_support(seen_by_share({{1.0, whole}}), {seen_by_share({{support, by_chance}})}, known)
-        .back();
+    const std::vector<std::vector<Circle>> chance(copies, seen_by_share({{support, by_chance}}));
+    return probabilities_by_support(seen_by_share({{1.0, whole}}), chance, known).back();
   };
   EXPECT_NEAR(of(58, 0.5, 40), 1 - 0.05 / 58, 1e-12);
   EXPECT_NEAR(of(58, 0.5, 40, Known::nothing), 1 - 40.05 / 58, 1e-12) << "small hexagons look whole, too";
   EXPECT_NEAR(of(19, 0.5, 15), 1 - 15.05 / 19, 1e-12);
   EXPECT_NEAR(of(58, 1.0, 40), 1 - 40.05 / 58, 1e-12);
   EXPECT_NEAR(of(58, 0.9, 40), 1 - 40.05 / 58, 1e-12) << "as good as whole";
+  EXPECT_NEAR(of(20, 0.5, 15), 1 - 0.05 / 20, 1e-12);
+  copies = 1;
+  EXPECT_NEAR(of(79, 0.5, 15), 1 - 15.05 / 79, 1e-12) << "one copy says a quarter as much";
+  EXPECT_NEAR(of(80, 0.5, 15), 1 - 0.05 / 80, 1e-12);
+}
+
+// The rows of the bands are those of whole copies, in the four directions by turns; each row is in one band, with
+// margins wide enough for the largest circles.
+TEST(PictureScale, MapsOfManyPixelsHaveOneCopyInBands) {
+  const GrayFrame frame = frame_by(2003, 1001, [](int column, int row) { return 200 * test::scattered(column, row); });
+  PictureMaps maps(frame, 8);
+  const PictureMap& map = maps.with_copies(9);
+  ASSERT_EQ(map.copies.size(), 1U);
+  const StretchedCopy& bands = map.copies.front();
+  ASSERT_EQ(bands.size(), 8U);
+  int row = 0;
+  for (std::size_t k = 0; k < bands.size(); ++k) {
+    const StretchedBand& band = bands[k];
+    EXPECT_EQ(band.angle, copy_angle(k % 4));
+    EXPECT_EQ(band.first_row + band.from, row);
+    row = band.first_row + band.to;
+    EXPECT_GE(std::min(band.from, band.edges.height - band.to), k > 0 && k < 7 ? 32 : 0);
+    EXPECT_TRUE(band.holds(band.from) && band.holds(band.to - 1));
+    EXPECT_FALSE(band.holds(band.from - 1) || band.holds(band.to));
+    if (k != 2 && k != 7) continue;
+    const EdgeMap whole = find_edges(stretched(frame, decoy_stretch, band.angle), map.edges.threshold);
+    for (int inner = 5; inner + 5 < band.edges.height; inner += 7)
+      for (int column = 5; column + 5 < 2003; column += 50) {
+        ASSERT_EQ(band.edges.x[band.edges.at(column, inner)], whole.x[whole.at(column, band.first_row + inner)]);
+        ASSERT_EQ(band.edges.y[band.edges.at(column, inner)], whole.y[whole.at(column, band.first_row + inner)]);
+      }
+  }
+  EXPECT_EQ(row, 1001);
+  EXPECT_EQ(maps.with_copies(18).copies.size(), 4U) << "half a million pixels";
 }
 
 }  // namespace

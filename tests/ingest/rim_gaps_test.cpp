@@ -43,7 +43,7 @@ class GapsByHand {
     const PictureMap& map = maps_.with_copies(std::sqrt(sizes.from * sizes.to), model_.threshold);
     std::array<Circles, 5> all;
     all[0] = circles_in(map.edges, map, sizes, beads, {});
-    for (std::size_t k = 0; k < 4; ++k) all[k + 1] = circles_in(map.copies[k], map, sizes, beads, k);
+    for (std::size_t k = 0; k < 4; ++k) all[k + 1] = circles_in(map.copies[k].front().edges, map, sizes, beads, k);
     return all;
   }
 
