@@ -21,6 +21,9 @@ namespace {
 constexpr double trial_radius_px = 9;  // frames are averaged down to it for the trials
 constexpr int trial_side_px = 640;     // of the part of a frame that trials look at
 constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
+// The same, for a change from faces to rims: their centres may be wrong by a tenth of a radius, so that they have to
+// show another tenth of the beads.
+constexpr double far_more = 1.1;
 constexpr double inside = 0.8, outside = 1.15,
                  farthest_behind = 1.3;  // radii: where a face and what is behind it are seen
 constexpr double least_contrast = 4;     // grey levels between the two
@@ -48,7 +51,18 @@ struct Trial {
   bool by_rims = true;
   double wrong = 1, missed = 1;  // shares that are expected, of the disks and of the beads
   [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly; }
+  // Beads found, less the disks that are none: a wrong disk is as bad as a bead that is missed.
+  [[nodiscard]] double worth() const { return expected - wrong * static_cast<double>(disks.size()); }
 };
+
+// Whether a channel in which more beads are expected shows them so well that this one is left for it.
+bool better_there(const Trial& here, const Trial& there) {
+  if (here.by_rims) return true;
+  if (here.doubtful()) return there.worth() > (there.by_rims ? far_more : clearly_more) * here.worth();
+  // More faces are found where other things pass as beads, too: these then are less sure.
+  return !there.by_rims && there.wrong < hardly;
+}
+
 Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<PixelRectangle>& roi, Shades shades) {
   FindOptions find;
   find.seen = seen;
@@ -223,9 +237,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
     const double wanted = most - here.expected;
     if (plain && trials.rims_beside(here.disks, *other.frame, other.polarity, wanted) <= wanted) continue;
     const Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
-    if (there.expected <= most) continue;
-    // More faces are found where other things pass as beads, too: these then are less sure.
-    if (!here.by_rims && (there.by_rims || there.wrong >= std::max(here.wrong, plain ? hardly : 0.0))) continue;
+    if (there.expected <= most || !better_there(here, there)) continue;
     most = clearly_more * there.expected;
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;

@@ -59,7 +59,7 @@ class FrameBudget {
       return {1, {}, record_of({1, all, 0, 0, true}, {}, all)};
     }
     FramePilot pilot;
-    const Run few = good(run_pilot(all, few_frames, {})), more = good(run_pilot(all, pilot_frames, {}));
+    const Run few = needed_pilot(all, few_frames), more = needed_pilot(all, pilot_frames);
     pilot.frames = more.frames;
     pilot.error = more.found.error.value_or(0);
     cost_of_frames(few.frames, few.seconds, more.frames, more.seconds, pilot);
@@ -108,8 +108,11 @@ class FrameBudget {
     pilot = its, choice = chosen, coarser_ = Coarser{reduction, shift};
   }
 
-  static Run good(Run run) {
-    if (!run.failure.empty()) throw StageError(run.failure);
+  Run needed_pilot(std::uint64_t all, std::uint64_t frames) {
+    Run run = run_pilot(all, frames, {});
+    if (!run.failure.empty())
+      throw StageError(
+          fmt::format("the pilot run of --budget, with {} of {} frames, failed: {}", run.frames, all, run.failure));
     return run;
   }
 
@@ -139,8 +142,7 @@ class FrameBudget {
         if (stage.cost) run.seconds += stage.cost->wall_seconds;
       run.found = found_below(run.out);
     } else {
-      run.failure =
-          fmt::format("the pilot run of --budget, with {} of {} frames, failed: {}", run.frames, all, outcome.error);
+      run.failure = outcome.error;
       run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     }
     spent_ += run.seconds;
