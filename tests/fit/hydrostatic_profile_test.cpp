@@ -1,5 +1,6 @@
 #include "fit/theory/hydrostatic_profile.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -232,6 +233,8 @@ TEST(Tails, MoveWithTheirBed) {
     return tail;
   };
   const Tail low = tail_at(0), high = tail_at(2.5);
+  // Where it ends the rectangle is the rectangle still: its density does not depend on T.
+  EXPECT_THAT(low.smoothed_with_gradient(low.start, KernelRule(Kernel{})), testing::ElementsAre(1.1, 0, 0, 1));
   for (const Kernel& kernel : {Kernel{}, Kernel{KernelKind::gaussian, 0.4}, Kernel{KernelKind::top_hat, 1},
                                Kernel{KernelKind::disk_chord, 1}}) {
     const KernelRule rule(kernel);
