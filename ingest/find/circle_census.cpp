@@ -197,11 +197,7 @@ class Census {
             hypothesis.gain_px / static_cast<double>(std::max<std::size_t>(1, edges.ridge.size()));
         hypothesis.radius_px *= level.scale;
         hypothesis.gain_px *= level.scale;
-        for (Circle& circle : hypothesis.seen) {
-          circle.x = level.to_frame_x(circle.x);
-          circle.y = level.to_frame_y(circle.y);
-          circle.radius *= level.scale;
-        }
+        for (Circle& circle : hypothesis.seen) circle = in_the_frame(circle, level);
         all_.push_back(std::move(hypothesis));
       }
     }

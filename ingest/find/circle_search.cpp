@@ -466,4 +466,18 @@ std::vector<Circle> without_doubles(std::vector<Circle> circles, double share) {
   return std::move(kept.all);
 }
 
+Circle on_the_map(Circle circle, const ScaledPicture& at) {
+  circle.x = at.from_frame_x(circle.x);
+  circle.y = at.from_frame_y(circle.y);
+  circle.radius /= at.scale;
+  return circle;
+}
+
+Circle in_the_frame(Circle circle, const ScaledPicture& at) {
+  circle.x = at.to_frame_x(circle.x);
+  circle.y = at.to_frame_y(circle.y);
+  circle.radius *= at.scale;
+  return circle;
+}
+
 }  // namespace shakebed::ingest

@@ -8,6 +8,7 @@
 
 #include "ingest/calibrate/calibration.hpp"
 #include "ingest/find/edge_map.hpp"
+#include "ingest/find/picture_scale.hpp"
 
 namespace shakebed::ingest {
 
@@ -20,6 +21,9 @@ struct Circle {
   int directions = 0;               // directions in all, and in which an edge was met, a bit each:
   std::uint64_t met = 0;
 };
+// px of the picture; px of the frame that it shows.
+Circle on_the_map(Circle circle, const ScaledPicture& at);
+Circle in_the_frame(Circle circle, const ScaledPicture& at);
 
 // Ratio of the axes of the stretched copies that tell what chance makes up: no bead's rim is round any more, textures
 // look much as before. At 1.4 a quarter of the white beads of a photograph (radius 7 px) still passed, at 1.8 a tenth.

@@ -117,8 +117,7 @@ bool leaves_rims(const GrayFrame& painted, double radius_px, Polarity polarity, 
   CirclesAsked asked{smallest_other * radius_px / at.scale, largest_other * radius_px / at.scale, polarity,
                      faintest_rim};
   std::vector<Circle> circles = find_circles(edges, asked);
-  for (Circle& circle : circles)
-    circle.x = at.to_frame_x(circle.x), circle.y = at.to_frame_y(circle.y), circle.radius *= at.scale;
+  for (Circle& circle : circles) circle = in_the_frame(circle, at);
   std::erase_if(circles, [&](const Circle& circle) {
     return free.overlapped(circle.x, circle.y, circle.radius) || !free.has_own_rim(circle);
   });

@@ -78,13 +78,6 @@ void measure_rims(const std::vector<Circle>& circles, double scale, RimModel& mo
   model.contrast = median_of(contrasts);
 }
 
-Circle in_the_frame(Circle circle, const ScaledPicture& at) {
-  circle.x = at.to_frame_x(circle.x);
-  circle.y = at.to_frame_y(circle.y);
-  circle.radius *= at.scale;
-  return circle;
-}
-
 RimDisk disk_of(const Circle& circle, const ScaledPicture& at, const RimModel& model) {
   RimDisk disk;
   disk.circle = in_the_frame(circle, at);
@@ -151,12 +144,6 @@ void measure_open_rims(const std::vector<Circle>& circles, const EdgeMap& edges,
   model.open_radius_px = (steepest + blur_of_map_px2 / (2 * steepest)) * scale;
 }
 
-Circle on_the_map(Circle circle, const ScaledPicture& at) {
-  circle.x = at.from_frame_x(circle.x);
-  circle.y = at.from_frame_y(circle.y);
-  circle.radius /= at.scale;
-  return circle;
-}
 std::vector<Circle> on_the_map(const std::vector<RimDisk>& disks, const ScaledPicture& at) {
   std::vector<Circle> circles;
   for (const RimDisk& disk : disks) circles.push_back(on_the_map(disk.circle, at));
@@ -335,10 +322,7 @@ std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const
       smaller = fit_circle(edges, smaller, model.polarity);
       if (smaller.support >= lone_support) fitted = smaller;
     }
-    fitted.x = at.to_frame_x(fitted.x);
-    fitted.y = at.to_frame_y(fitted.y);
-    fitted.radius *= at.scale;
-    circles.push_back(fitted);
+    circles.push_back(in_the_frame(fitted, at));
   }
   return circles;
 }

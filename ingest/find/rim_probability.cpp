@@ -15,9 +15,8 @@ constexpr double prior_at_full = 0.05, prior_per_missing = 0.4;
 constexpr std::size_t near_classes = 4;
 // Share of their rims from which circles are seen whole. Clutter that leaves gaps does not close them.
 constexpr double seen_whole = 0.9;
-// Of a class of so many whole circles, over the number of copies, none of which is seen in the copies, chance makes up
-// less than 3 over that number in the picture (at 95 %, by Poisson's law): a share that is small whatever the classes
-// below hold.
+// Where a class has n whole circles in the picture and none in c copies, chance makes up less than 3/c of the n (at
+// 95 %, by Poisson's law). This share is small where n c is 80 or more, whatever the classes below hold.
 constexpr double many_whole = 80, share_of_few = 0.05;
 
 // Circles of one class of support, in the frame and (the mean) in its copies.

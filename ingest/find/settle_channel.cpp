@@ -137,10 +137,10 @@ class ChannelTrials {
     return expected;
   }
 
-  // Sure rims in this channel, none of which lies on a disk found. Where there are no more than `too_few` circles, sure
-  // or not, their number.
-  [[nodiscard]] double rims_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture, Polarity polarity,
-                                   double too_few) const {
+  // Whether this channel shows more than `wanted` sure rims, none of which lies on a disk found. Where it has no more
+  // circles than that, they need not be judged.
+  [[nodiscard]] bool shows_more_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture, Polarity polarity,
+                                       double wanted) const {
     const GrayFrame part = small(picture);
     PictureMaps maps(part, quick_search.wanted_px);
     const auto beside = [&](const Circle& circle) {
@@ -148,13 +148,12 @@ class ChannelTrials {
         return std::hypot(disk.x_px - circle.x, disk.y_px - circle.y) < nearest_of_another * radius_px();
       });
     };
-    const std::vector<Circle> all = circles_seen(maps, polarity, radius_px());
-    const auto circles = static_cast<double>(std::count_if(all.begin(), all.end(), beside));
-    if (circles <= too_few) return circles;
+    const std::vector<Circle> circles = circles_seen(maps, polarity, radius_px());
+    if (static_cast<double>(std::count_if(circles.begin(), circles.end(), beside)) <= wanted) return false;
     double sure = 0;
     for (const RimDisk& rim : learn_rims(maps, polarity, radius_px(), Known::beads).disks)
       sure += rim.probability >= sure_rim && beside(rim.circle);
-    return sure;
+    return sure > wanted;
   }
 
   // Of the beads in this channel; none where they hardly stand out.
@@ -234,8 +233,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   double most = clearly_more * here.expected;
   for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
-    const double wanted = most - here.expected;
-    if (plain && trials.rims_beside(here.disks, *other.frame, other.polarity, wanted) <= wanted) continue;
+    if (plain && !trials.shows_more_beside(here.disks, *other.frame, other.polarity, most - here.expected)) continue;
     const Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
     if (there.expected <= most || !better_there(here, there)) continue;
     most = clearly_more * there.expected;

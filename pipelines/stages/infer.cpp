@@ -166,12 +166,12 @@ void Infer::describe(Fields& fields) {
                  {.help = "number of equally spaced moments in each period of the shaking at which the bed is "
                           "measured; its profile is the average over them",
                   .range = from_to(1, 4096)});
-  fields.quantity(
-      "frame_rate", options_.bed.frame_rate, dimension::frequency,
-      {.help = "frame rate of the film that the targets come from. Each bed is then measured at the moments "
-               "of its frames, in place of \"phases\", and temperature_x_without_flow_over_mg and "
-               "temperature_z_without_flow_over_mg are those of displacements between frames",
-       .range = positive});
+  fields.quantity("frame_rate", options_.bed.frame_rate, dimension::frequency,
+                  {.help = "frame rate of the film that the targets come from, or a part of it where not every frame "
+                           "was measured. Each bed is then measured at the moments "
+                           "of its frames, in place of \"phases\", and temperature_x_without_flow_over_mg and "
+                           "temperature_z_without_flow_over_mg are those of displacements between frames",
+                   .range = positive});
   fields.number("kernel_width", options_.bed.kernel_width,
                 {.help = "standard deviation of the Gaussian kernel of the profile, in D", .range = from_to(0.01, 10)});
   fields.number("plateau_density", options_.bed.plateau_density,

@@ -77,6 +77,7 @@ struct ScaledTarget {
   double least_scatter = 0, further_error = 0;
 };
 
+std::string unit_of(const InferOptions& options, const Observable& observable);
 void describe_targets(Fields& fields, InferOptions& options);
 // Throws InputError where a stage or a file does not give what is asked for.
 std::vector<ScaledTarget> scaled_targets(const RunContext& context, const InferOptions& options);

@@ -19,10 +19,6 @@ constexpr int rank_bins = 10;      // of the ranks of a calibration
 // "No bed" is said from three standard deviations on.
 constexpr double enough_deviations = 3;
 
-std::string unit_of(const InferOptions& options, const Observable& observable) {
-  if (!observable.is_length) return std::string(observable.unit);
-  return options.bed.reduced ? "D" : "m";
-}
 std::string unit_of(const UnknownParameter& parameter) { return parameter.unit.empty() ? "1" : parameter.unit; }
 std::string column_of(const InferOptions& options, const Observable& observable) {
   return std::string(observable.name) + (observable.is_length && !options.bed.reduced ? "_m" : "");

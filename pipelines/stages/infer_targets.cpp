@@ -156,6 +156,15 @@ void require_same_frame_rate(const InferTarget& target, const Json& result, cons
         target.at, number_text(film), number_text(beds), number_text(film)));
 }
 
+// A temperature as a length is one in m or in D, and one in m g D is none.
+void require_same_unit(const InferTarget& target, const Json& found, const InferOptions& options,
+                       const Observable& observable) {
+  const std::string wanted = unit_of(options, observable);
+  if (found.contains("unit") && found["unit"] != wanted)
+    throw InputError(fmt::format("{}: this number is in {}, but {} of the inference is in {}. Point to a number in {}",
+                                 target.at, found["unit"].get<std::string>(), observable.name, wanted, wanted));
+}
+
 ScaledTarget number_target(const RunContext& context, const InferOptions& options, std::size_t k) {
   InferTarget target = *options.targets[k];
   if (!target.at.empty()) {
@@ -166,6 +175,7 @@ ScaledTarget number_target(const RunContext& context, const InferOptions& option
       throw InputError(
           fmt::format("{}: the result at this pointer is not a number, so it cannot be a target", target.at));
     require_same_frame_rate(target, result, options);
+    require_same_unit(target, *found, options, observables()[k]);
     target.value = (*found)["value"].get<double>();
     if (found->contains("std_error")) {
       const Json& error = (*found)["std_error"];
@@ -219,6 +229,11 @@ std::vector<ScaledTarget> profile_targets(const RunContext& context, const Infer
 }
 
 }  // namespace
+
+std::string unit_of(const InferOptions& options, const Observable& observable) {
+  if (!observable.is_length) return std::string(observable.unit);
+  return options.bed.reduced ? "D" : "m";
+}
 
 std::vector<ScaledTarget> scaled_targets(const RunContext& context, const InferOptions& options) {
   std::vector<ScaledTarget> out;

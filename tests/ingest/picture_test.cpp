@@ -310,7 +310,7 @@ TEST(PictureFiles, SmallOnesAreAtMostAsWide) {
   EXPECT_EQ(small.cols, 10);
   EXPECT_EQ(small.rows, 5);
   EXPECT_NEAR(small.at<std::uint8_t>(2, 5), 6 * 21.5, 6);
-  for (const auto [width, height] : {std::pair{0, 0}, {0, 5}, {5, 0}})
+  for (const auto& [width, height] : {std::pair{0, 0}, {0, 5}, {5, 0}})
     EXPECT_THROW(small_webp({width, height, {}}, 10, 80), InputError) << width << " x " << height;
 }
 

@@ -139,7 +139,7 @@ GrayFrame on_mottled_ground(int side, unsigned seed, std::size_t* count) {
   std::vector<std::pair<double, double>> beads;
   for (int y = 50; y < side - 60; y += 90)
     for (int x = 50; x < side - 60; x += 90) {
-      const double right = random() % 20, down = random() % 20;
+      const auto right = static_cast<double>(random() % 20), down = static_cast<double>(random() % 20);
       beads.emplace_back(x + right, y + down);
     }
   *count = beads.size();

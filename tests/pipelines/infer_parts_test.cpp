@@ -229,6 +229,24 @@ TEST_F(TargetsOfStages, AreOnTheScaleOnWhichTheyAreCompared) {
   EXPECT_EQ(refusal(), "temperature_over_mg: the target must be above 0, but is 0");
 }
 
+// In m: those of the program's own T in m g D, or in D of a bed in reduced units, would be read as m.
+TEST_F(TargetsOfStages, HaveTheUnitInWhichTheyAreCompared) {
+  target("temperature_x_over_mg").at = "/fit/t";
+  const auto in_unit = [&](const char* unit) {
+    write_text(stage_.file("fit/fit.json"),
+               std::string(R"({ "t": { "value": 0.2, "std_error": 0.01, "unit": ")") + unit + "\" } }");
+    return refusal();
+  };
+  EXPECT_EQ(in_unit("m"), "");
+  EXPECT_EQ(in_unit("m g D"),
+            "/fit/t: this number is in m g D, but temperature_x_over_mg of the inference is in m. "
+            "Point to a number in m");
+  EXPECT_THAT(in_unit("D"), HasSubstr("this number is in D"));
+  options_.bed.reduced = true;
+  EXPECT_EQ(in_unit("D"), "");
+  EXPECT_THAT(in_unit("m"), HasSubstr("is in D. Point to a number in D"));
+}
+
 // Every second frame of a film of 500 Hz.
 TEST_F(TargetsOfStages, AreDisplacementsBetweenFramesAtTheSameRate) {
   target("temperature_x_without_flow_over_mg").at = "/film/velocities/temperature_x_of_displacements_over_mg";

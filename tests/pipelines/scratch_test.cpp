@@ -95,27 +95,20 @@ class Scratch : public testing::Test {
     run_stages(plan_of(end, option, id), options, nullptr, outcome);
     return outcome.code;
   }
-  void run_and_be_killed(int option) {
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      run(End::killed, option);
-      ::_exit(1);  // not reached
-    }
-    int status = 0;
-    ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ASSERT_TRUE(WIFSIGNALED(status)) << status;
-  }
-  int code_of_run_in_a_child(End end) {  // the interrupt stays on record in its process
+  // What waitpid() says of it: an interrupt stays on record in its process.
+  int status_of_run_in_a_child(End end, int option) {
     const pid_t child = ::fork();
     if (child == 0) {
       install_interrupt_handler();
-      ::_exit(run(end, 1));
+      ::_exit(run(end, option));
     }
     int status = 0;
     EXPECT_EQ(::waitpid(child, &status, 0), child);
-    EXPECT_TRUE(WIFEXITED(status)) << status;
-    return WEXITSTATUS(status);
+    return status;
+  }
+  void run_and_be_killed(int option) {
+    const int status = status_of_run_in_a_child(End::killed, option);
+    ASSERT_TRUE(WIFSIGNALED(status)) << status;
   }
   std::string starts(const std::string& id = "count") { return read_file(folder_ / (id + "/starts.txt")); }
   ScratchFolder folder_;
@@ -151,9 +144,11 @@ TEST_F(Scratch, OptionsTriedInBetweenDoNotCostIt) {
 
 // Ctrl-C after a stage has last looked for it: what it wrote is not taken for its result.
 TEST_F(Scratch, OutlivesAnInterruptInTheLastMoment) {
-  EXPECT_EQ(code_of_run_in_a_child(End::interrupted), exit_interrupted);
+  const int status = status_of_run_in_a_child(End::interrupted, 1);
+  ASSERT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), exit_interrupted);
   EXPECT_FALSE(fs::exists(folder_ / "count"));
-  EXPECT_EQ(code_of_run_in_a_child(End::well), exit_ok);
+  EXPECT_EQ(run(End::well, 1), exit_ok);
   EXPECT_EQ(starts(), "xx");
 }
 
