@@ -9,6 +9,11 @@ BeadAsymmetry::BeadAsymmetry(Harmonics harmonics) : harmonics_(std::move(harmoni
   const std::size_t count = harmonics_.cosine.front().size();
   reach_ = count < 2 ? 0.0 : harmonics_.step_px * static_cast<double>(count - 1);
   side_ = static_cast<int>(std::ceil(reach_)) + 1;
+  for (std::size_t k = 0; k < count; ++k) {
+    Ring& ring = rings_.emplace_back();
+    for (std::size_t m = 0; m < orders; ++m)
+      ring[2 * m] = harmonics_.cosine[m][k], ring[2 * m + 1] = harmonics_.sine[m][k];
+  }
   constexpr double small = 16;  // px: finer samples are cheap
   finer_ = reach_ < small ? 8 : 4;
 }
@@ -34,19 +39,21 @@ double BeadAsymmetry::at(double dx, double dy) const {
   if (r >= reach_ || r < 1e-9) return 0;
   const double place = r / harmonics_.step_px;
   const auto cell = static_cast<std::size_t>(place);
+  if (cell + 1 >= rings_.size()) return 0;
   const double part = place - static_cast<double>(cell);
-  if (cell + 1 >= harmonics_.cosine.front().size()) return 0;
+  const Ring &inner = rings_[cell], &outer = rings_[cell + 1];
   const double cosine = dx / r, sine = dy / r;
-  double c = cosine, s = sine, sum = 0;
-  for (std::size_t m = 0; m < orders; ++m) {
-    const auto &along = harmonics_.cosine[m], &across = harmonics_.sine[m];
-    sum += c * ((1 - part) * along[cell] + part * along[cell + 1]) +
-           s * ((1 - part) * across[cell] + part * across[cell + 1]);
-    const double next = c * cosine - s * sine;
-    s = s * cosine + c * sine;
-    c = next;
+  Ring turned = {cosine, sine};  // cos and sin of m theta
+  for (std::size_t m = 2; m < turned.size(); m += 2) {
+    turned[m] = turned[m - 2] * cosine - turned[m - 1] * sine;
+    turned[m + 1] = turned[m - 1] * cosine + turned[m - 2] * sine;
   }
-  return sum;
+  constexpr std::size_t lanes = 4;
+  std::array<double, lanes> sum{};
+  for (std::size_t k = 0; k < turned.size(); k += lanes)
+    for (std::size_t lane = 0; lane < lanes; ++lane)
+      sum[lane] += turned[k + lane] * (inner[k + lane] + part * (outer[k + lane] - inner[k + lane]));
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
 double BeadAsymmetry::one_sidedness(double radius_px) const {

@@ -28,7 +28,10 @@ class BeadAsymmetry {
   void add_to_row(float* row, int left, int count, double x_px, double dy_px, float sign) const;
 
  private:
+  // The harmonics of one distance: c_1, s_1, c_2, s_2 ...
+  using Ring = std::array<double, 2 * orders>;
   Harmonics harmonics_;
+  std::vector<Ring> rings_;
   double reach_ = 0;
   // Sampled `finer_` times as finely as pixels, columns of one phase beside one another. Row j, phase p, place k hold
   // the value at dx = k - side_ - p/finer_, dy = j/finer_ - side_.

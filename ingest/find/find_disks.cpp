@@ -370,7 +370,7 @@ GrayFrame residual_frame(const GrayFrame& frame, const FindResult& found, const 
     throw std::invalid_argument(
         "residual_frame: the frame differs in size from the frames in which the beads were learned");
   const GrayFrame flat = flatten(seen_part(frame, calibration), calibration.light, found.light);
-  const ProfileTable table(calibration.profile, calibration.rim_radius_px, calibration.edge_width_px, 0);
+  const ProfileTable table(calibration.profile, calibration.rim_radius_px, calibration.edge_width_px, 0, false);
   JointFit fit(flat);
   fit.set_table(&table);
   for (const FoundDisk& disk : found.disks) fit.subtract(disk.x_px, disk.y_px, 1.0F);

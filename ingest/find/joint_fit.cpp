@@ -22,9 +22,22 @@ double interpolate(const std::vector<float>& samples, double step, double r) {
   return static_cast<double>(samples[cell]) * (1 - part) + static_cast<double>(samples[cell + 1]) * part;
 }
 
+float dot(const float* one, const float* other, std::size_t count) {
+  Floats sum{}, a, b;
+  std::size_t k = 0;
+  for (; k + lanes <= count; k += lanes) {
+    load(one + k, a), load(other + k, b);
+    sum += a * b;
+  }
+  float rest = ingest::sum_of(sum);
+  for (; k < count; ++k) rest += one[k] * other[k];
+  return rest;
+}
+
 }  // namespace
 
-ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px) {
+ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px,
+                           bool overlaps) {
   reach_ = profile.reach_px();
   asymmetry_ = profile.asymmetry;
   const double resolution = std::clamp(0.05 * edge_px, 0.01, 0.06);
@@ -63,7 +76,7 @@ ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double 
     }
     if (soft_true > soft_soft) relaxation_ = soft_soft / soft_true;
   }
-  prepare_overlaps(radius_px, edge_px);
+  if (overlaps) prepare_overlaps(radius_px, edge_px);
   fourth_ = std::any_of(profile.fourth_harmonic.begin(), profile.fourth_harmonic.end(), [](float v) { return v != 0; });
   if (fourth_) {
     fourth_level_.assign(count, 0.0F);
@@ -80,30 +93,46 @@ ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double 
 void ProfileTable::prepare_overlaps(double radius_px, double edge_px) {
   // Sums over the lens that two beads share, one at (0, 0), the other at (distance, 0): by symmetry the blocks are
   // diagonal. Beads nearer than overlap_from_px are on their way out; what they get need only be roughly right.
-  overlap_from_px_ = 1.4 * radius_px;
-  overlap_step_px_ = std::max(0.25, 0.2 * edge_px);
-  constexpr double grid = 0.5;  // px
-  const auto slope_at = [&](const std::vector<float>& rise, double dx, double dy) {
-    const double place = (dx * dx + dy * dy) * static_cast<double>(inverse_step_);
-    return place < last_ ? static_cast<double>(rise[static_cast<std::size_t>(place)]) : 0.0;
+  // Distances are whole cells of one grid, so each bead's gradients are looked up once.
+  const double cell = edge_px < 1 ? 0.25 : 0.5;  // px
+  const int from = static_cast<int>(1.4 * radius_px / cell), by = std::max(1, static_cast<int>(0.2 * edge_px / cell));
+  overlap_from_px_ = from * cell, overlap_step_px_ = by * cell;
+  const int rows = static_cast<int>(std::ceil(reach_ / cell)), columns = 2 * rows;
+  struct Gradient {
+    std::vector<float> x, y;
   };
-  const auto sums = [&](double distance) {
-    Overlap overlap;
-    const double lens = std::sqrt(std::max(0.0, reach_ * reach_ - 0.25 * distance * distance));
-    for (double y = 0.5 * grid; y <= lens; y += grid)  // and its mirror image
-      for (double x = distance - reach_; x <= reach_; x += grid) {
-        const double product = slope_at(soft_rise_, x, y) * slope_at(rise_, x - distance, y);
-        overlap.along += 2 * product * x * (x - distance);
-        overlap.across += 2 * product * y * y;
+  const auto gradient_of = [&](const std::vector<float>& rise) {
+    const auto size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+    Gradient gradient{std::vector<float>(size), std::vector<float>(size)};
+    for (int row = 0, at = 0; row < rows; ++row)  // and its mirror image
+      for (int column = 0; column < columns; ++column, ++at) {
+        const double x = cell * (column - rows + 0.5), y = cell * (row + 0.5);
+        const double place = (x * x + y * y) * static_cast<double>(inverse_step_);
+        const float slope = place < last_ ? rise[static_cast<std::size_t>(place)] : 0.0F;
+        const auto to = static_cast<std::size_t>(at);
+        gradient.x[to] = slope * static_cast<float>(x), gradient.y[to] = slope * static_cast<float>(y);
       }
-    return overlap;
+    return gradient;
+  };
+  const Gradient soft = gradient_of(soft_rise_), sharp = gradient_of(rise_);
+  const auto sums = [&](int distance) {
+    float along = 0, across = 0;
+    for (int row = 0; row < rows; ++row) {
+      const auto line = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns);
+      const auto shift = static_cast<std::size_t>(distance);
+      const auto common = static_cast<std::size_t>(columns - distance);
+      along += dot(&soft.x[line + shift], &sharp.x[line], common);
+      across += dot(&soft.y[line + shift], &sharp.y[line], common);
+    }
+    return Overlap{static_cast<double>(along), static_cast<double>(across)};
   };
   const Overlap own = sums(0);
   if (!(own.along > 0)) return;
-  for (double distance = overlap_from_px_; distance < 2 * reach_ + overlap_step_px_; distance += overlap_step_px_) {
+  for (int distance = from; distance < columns; distance += by) {
     const Overlap overlap = sums(distance);
     overlaps_.push_back({overlap.along / own.along, overlap.across / own.along});
   }
+  overlaps_.push_back({0, 0});
 }
 
 ProfileTable::Overlap ProfileTable::overlap(double distance_px) const {

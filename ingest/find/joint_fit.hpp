@@ -32,7 +32,8 @@ class ProfileTable {
  public:
   ProfileTable() = default;
   // `softening_px` > 0 widens the gradient used for the steps (not the model): beads further off are then drawn in.
-  ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px);
+  // `overlaps`: false for residuals alone, without steps or covariances.
+  ProfileTable(const BeadProfile& profile, double radius_px, double edge_px, double softening_px, bool overlaps = true);
   [[nodiscard]] double reach() const { return reach_; }
   [[nodiscard]] double at(double squared_distance) const;
   // Overlap of the gradients of two beads `distance_px` apart, along the line of centres and across it, as a share of

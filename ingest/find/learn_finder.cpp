@@ -198,7 +198,7 @@ class BeadLearner {
   // Beads are searched for in the first rounds, and fitted in every one.
   void fit_beads(int round) {
     const bool search = round <= 1 || (round == 2 && edge_ > strong_blur * radius_);
-    table_ = {profile_, radius_, edge_, round <= 2 ? softening_for(edge_) : softening_for(edge_) * 0.6};
+    table_ = {profile_, radius_, edge_, round <= 2 ? softening_for(edge_) : softening_for(edge_) * 0.6, round > 0};
     for (std::size_t f = 0; f < recorded_.size(); ++f) {
       GrayFrame& flat = beads_->flats[f];
       std::vector<ModelDisk>& disks = beads_->disks[f];
@@ -285,7 +285,7 @@ class BeadLearner {
 
   // The residuals with the profile as it is now.
   void renew_residuals() {
-    table_ = {profile_, radius_, edge_, 0};
+    table_ = {profile_, radius_, edge_, 0, false};
     for (std::size_t f = 0; f < recorded_.size(); ++f) {
       beads_->fits[f]->set_table(&table_);
       beads_->fits[f]->reset(beads_->flats[f], beads_->disks[f]);

@@ -116,7 +116,7 @@ class ReadingInLight {
     constexpr int rounds = 3;
     const std::vector<ModelDisk>& disks = beads_.disks.front();
     for (int round = 0;; ++round) {
-      const ProfileTable table(profile, calibration.rim_radius_px, calibration.edge_width_px, 0);
+      const ProfileTable table(profile, calibration.rim_radius_px, calibration.edge_width_px, 0, false);
       fit.set_table(&table);
       fit.reset(flat, disks);
       if (round == rounds) break;
