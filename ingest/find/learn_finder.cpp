@@ -404,11 +404,12 @@ class StartChooser {
       }
       return;
     }
-    estimate_ = estimate_radius(open_part(*frames_.front()), options_.polarity,
-                                std::max(1.0, 0.8 * *options_.radius_px), 1.25 * *options_.radius_px);
-    if (!estimate_.found && options_.polarity != Polarity::automatic) {
+    if (options_.polarity != Polarity::automatic) {
       estimate_.found = true;
       estimate_.polarity = options_.polarity;
+    } else {
+      estimate_ = estimate_radius(open_part(*frames_.front()), options_.polarity,
+                                  std::max(1.0, 0.8 * *options_.radius_px), 1.25 * *options_.radius_px);
     }
     if (estimate_.found) estimate_.radius_px = *options_.radius_px;
     estimate_.packed_radius_px = 0;

@@ -236,13 +236,10 @@ class OutlineFollower {
     const OutlinePath path(slopes_, circle, std::max(least_slope_, median_of(rim)));
     OneOutline outline;
     outline.x = circle.x, outline.y = circle.y;
-    double clear = 0, on_circle = 0;
-    for (std::size_t k = 0; k < outline_directions; ++k) {
-      clear += path.weight[k];
-      if (std::abs(path.offset[k]) < on_the_circle) on_circle += path.weight[k];
-    }
+    double clear = 0;
+    for (const double weight : path.weight) clear += weight;
     outline.followed = clear / outline_directions;
-    outline.on_circle = clear > 0 ? on_circle / clear : 0;
+    outline.on_circle = clear > 0 ? share_on_circle(path, {}) / clear : 0;
     outline.gap = gap_of(path, circle);
     outline.rim_width = rim_width_of(circle);
     if (outline.followed >= least_followed) develop(path, clear, outline);
@@ -256,8 +253,22 @@ class OutlineFollower {
     return largest;
   }
 
+  // Sum of the weights of what lies on a circle of the first three terms: size and place.
+  static double share_on_circle(const OutlinePath& path, const std::array<double, outline_terms>& terms) {
+    double on_circle = 0;
+    for (std::size_t k = 0; k < outline_directions; ++k) {
+      double circle = 0;
+      for (std::size_t p = 0; p < 3; ++p) circle += terms[p] * rays()[k].basis[p];
+      if (std::abs(path.offset[k] - circle) < on_the_circle) on_circle += path.weight[k];
+    }
+    return on_circle;
+  }
+
+  // About the outline's own circle: of beads that others cover in part, the circles seen are smaller than those of
+  // beads that lie alone.
   static void develop(const OutlinePath& path, double clear, OneOutline& outline) {
     const std::array<double, outline_terms> amplitude = harmonics_of(path);
+    outline.on_circle = share_on_circle(path, amplitude) / clear;
     double squares = 0;
     for (std::size_t k = 0; k < outline_directions; ++k) {
       double shape = 0;

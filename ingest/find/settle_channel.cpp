@@ -57,8 +57,8 @@ struct Trial {
 
 // Whether a channel in which more beads are expected shows them so well that this one is left for it.
 bool better_there(const Trial& here, const Trial& there) {
-  if (here.by_rims) return true;
-  if (here.doubtful()) return there.worth() > (there.by_rims ? far_more : clearly_more) * here.worth();
+  if (here.by_rims || here.doubtful())
+    return there.worth() > (there.by_rims && !here.by_rims ? far_more : clearly_more) * here.worth();
   // More faces are found where other things pass as beads, too: these then are less sure.
   return !there.by_rims && there.wrong < hardly;
 }
@@ -226,20 +226,20 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
   const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
   if ((frames.channels.size() < 2 && !large) || first == frames.channels.end()) return best;
-  const Trial here = trials.trial_in(first->frame, best.rims.polarity, Shades::common);
+  Trial most = trials.trial_in(first->frame, best.rims.polarity, Shades::common);
   SurveyCandidate settled = best;
-  settled.by_rims = here.by_rims;
-  const bool plain = !here.by_rims && !here.doubtful();
-  double most = clearly_more * here.expected;
+  settled.by_rims = most.by_rims;
+  const bool plain = !most.by_rims && !most.doubtful();
   for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
-    if (plain && !trials.shows_more_beside(here.disks, *other.frame, other.polarity, most - here.expected)) continue;
-    const Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
-    if (there.expected <= most || !better_there(here, there)) continue;
-    most = clearly_more * there.expected;
+    const double wanted = clearly_more * most.expected;
+    if (plain && !trials.shows_more_beside(most.disks, *other.frame, other.polarity, wanted - most.expected)) continue;
+    Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
+    if (there.expected <= wanted || !better_there(most, there)) continue;
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;
     settled.by_rims = there.by_rims;
+    most = std::move(there);
   }
   return settled;
 }

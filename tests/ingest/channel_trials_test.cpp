@@ -109,5 +109,28 @@ TEST(ChannelTrials, LeaveFacesThatMissManyForRimsOfFarMore) {
   EXPECT_EQ(settled_of_packed({250, 210, 178}).channel, Channel::red);
 }
 
+std::vector<RenderedDisk> ten_beads() {
+  const std::vector<RenderedDisk> all = beads_of_trial();
+  return {all.begin(), all.begin() + 10};
+}
+
+// Rims of 2 px alone.
+GrayFrame rings_of(const std::vector<RenderedDisk>& disks) {
+  std::vector<RenderedDisk> inside = disks;
+  for (RenderedDisk& disk : inside) disk.radius_px -= 2;
+  return sum_of(test::beads_of_level(disks, 70), test::beads_of_level(inside, 230));
+}
+
+// Blue shows one bead more than green does, but by its rim alone.
+TEST(ChannelTrials, CompareEachChannelWithTheBestSoFar) {
+  const std::vector<RenderedDisk> all = ten_beads();
+  TrialFrames beads({all.begin(), all.end() - 3}, {all.begin(), all.end() - 1}, 70);
+  beads.frames.channels[0].frame = rings_of({all.begin(), all.end() - 3});
+  beads.frames.channels.push_back({Channel::blue, rings_of(all)});
+  const SurveyCandidate settled = beads.settled();
+  EXPECT_EQ(settled.channel, Channel::green);
+  EXPECT_FALSE(settled.by_rims);
+}
+
 }  // namespace
 }  // namespace shakebed::ingest

@@ -210,12 +210,15 @@ class TracedByHand {
     std::array<double, 13> amplitude{};
     for (std::size_t p = 0; p < 13; ++p)
       for (std::size_t q = 0; q < 13; ++q) amplitude[p] += inverse[p][q] * right[q];
-    double squares = 0;
+    double squares = 0, on_its_own = 0;
     for (int k = 0; k < ways; ++k) {
       double shape = 0;
+      const double circle = amplitude[0] + amplitude[1] * term(1, k) + amplitude[2] * term(2, k);
+      if (std::abs(offset(k) - circle) < 0.1) on_its_own += weight(k);
       for (int p = 3; p < 13; ++p) shape += amplitude[static_cast<std::size_t>(p)] * term(p, k);
       squares += weight(k) * shape * shape;
     }
+    out.on_circle = on_its_own / clear;
     out.deviation = std::sqrt(squares / clear);
     for (std::size_t q = 2; q <= 6; ++q) out.harmonic[q] = {amplitude[2 * q - 1], amplitude[2 * q]};
     out.developed = true;
@@ -342,6 +345,22 @@ TEST(OutlinesByHand, TellOnWhichSideTheyAreRound) {
         EXPECT_FALSE(found.round());
         EXPECT_NEAR(found.not_round, 0.5, 1e-9);
       }
+}
+
+// Circles of beads that others cover in part are smaller than those of beads that lie alone.
+TEST(OutlinesByHand, AreRoundAboutCirclesOfAnotherSize) {
+  std::vector<Circle> circles;
+  for (int along = 0; along < 8; ++along)
+    for (int across = 0; across < 4; ++across)
+      circles.push_back({18.0 + 30 * along, 18.0 + 30 * across, along < 4 ? 11 : 9.5});
+  const GrayFrame frame = test::frame_by(246, 126, [&](int column, int row) {
+    const double away = std::hypot(std::remainder(column - 18.0, 30), std::remainder(row - 18.0, 30)) - 11;
+    return 150 - 80 * 0.5 * std::erfc(away / 1.3);
+  });
+  const Roundness found = roundness_of(find_edges(frame), circles, Polarity::dark_beads);
+  EXPECT_TRUE(found.round()) << found.why_not();
+  EXPECT_EQ(found.not_round, 0);
+  EXPECT_FALSE(found.round_side);
 }
 
 TEST(OutlinesByHand, APartIsThePixelsOfItsSide) {
