@@ -236,7 +236,8 @@ TEST_F(Faults, TheClockJumps) {
 }
 
 TEST_F(Faults, MemoryIsShort) {
-  // Below some 24 MB not even the program's libraries can be loaded; from there on every amount gives an end of ours.
+  // Below some 22 MB not even the program's libraries can be loaded and set up; from there on every amount gives an end
+  // of ours.
   int failed = 0, started = 0;
   std::string text = recipe();
   text.replace(text.find("\"count\": 40"), 11, "\"count\": 8000");
@@ -244,7 +245,7 @@ TEST_F(Faults, MemoryIsShort) {
   text.replace(text.find("\"0.2 s\""), 7, "0");
   text.replace(text.find("\"0.5 s\""), 7, "\"0.05 s\"");
   write_text(folder_ / "large.json", text);
-  for (const rlim_t megabytes : {16u, 20u, 24u, 28u, 32u, 64u}) {
+  for (const rlim_t megabytes : {24u, 28u, 32u, 40u, 64u}) {
     fs::remove_all(folder_ / "m");
     ProgramResult result;
     {
