@@ -159,6 +159,17 @@ TEST(Rows, OfACrystalHaveItsDisksAndDensity) {
   EXPECT_NEAR(order.bottom_density(), 2 / (root3 * 1.02 * 1.02), 1e-12);
 }
 
+// Of the outer two of three rows half of the disks count: 12/2 + 9 + 4/2 in the height of two rows.
+TEST(Rows, OfUnequalNumbersHaveTheirMeanDensity) {
+  std::vector<int> left_out;
+  for (int k = 0; k < 3; ++k) left_out.push_back(12 + 4 * k);
+  for (int k = 0; k < 8; ++k) left_out.push_back(24 + k);
+  const Lattice crystal = lattice(12, 10, left_out);
+  OrderObserver order(crystal.scene, crystal.disks, 1, {0, 1, 20});
+  order.observe(crystal.at);
+  EXPECT_NEAR(order.bottom_density(), 17 / (12 * 1.02 * 2 * 1.02 * root3 / 2), 1e-12);
+}
+
 // Two equal rows d apart, smoothed by 0.06 D, have between them 2 t/(1 + t^4) of their peaks, t = exp(-d^2/(8 0.06^2)):
 // less than 0.8, and so two rows, from d = 0.16 D on.
 TEST(Rows, AreToldApartFromASixthOfADiameterOn) {

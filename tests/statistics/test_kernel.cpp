@@ -110,6 +110,8 @@ TEST(Kernel, EverySpellingComesBack) {
   for (const char* wrong : {"top-hat", "disk-chord", "Gaussian", "", "boxcar"})
     EXPECT_FALSE(kernel_kind_from(wrong)) << wrong;
   EXPECT_EQ(kernel_from("gaussian:0.25"), (Kernel{KernelKind::gaussian, 0.25}));
+  EXPECT_EQ(kernel_from("gaussian"), (Kernel{KernelKind::gaussian, 0.5}));
+  EXPECT_EQ(kernel_from("disk_chord"), (Kernel{KernelKind::disk_chord, 1}));
   EXPECT_EQ(kernel_from("top_hat"), (Kernel{KernelKind::top_hat, 1}));
   EXPECT_EQ(kernel_from("none"), (Kernel{KernelKind::none, 0}));
   for (const char* wrong : {"none:1", "gaussian:", "gaussian:x", "gaussian:-1", "gaussian:0.5 D", "gaussian:nan"})
