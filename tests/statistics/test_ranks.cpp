@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <random>
 #include <vector>
 
 #include "statistics/ranks.hpp"
@@ -29,6 +31,21 @@ TEST(Ranks, AreThoseOfASortedList) {
   }
   EXPECT_EQ(quantile_of(std::vector<float>{}, 0.5), 0);
   EXPECT_EQ(median_of(std::vector<int>{}), 0);
+}
+
+TEST(Ranks, OfManyFloatsAreThoseOfASortedList) {
+  std::mt19937 random(1);
+  for (const float scale : {1e-30F, 3.0F, 1e20F}) {
+    std::vector<float> values;
+    for (int k = 0; k < 10'000; ++k)
+      values.push_back(scale * (k % 2 != 0 ? static_cast<float>(random() % 50) - 20 : std::ldexp(1.0F, k % 20)));
+    std::vector<float> sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    for (const std::size_t place : {0U, 1U, 4'000U, 5'000U, 7'777U, 9'999U})
+      EXPECT_EQ(value_of_rank(values, place), sorted[place]) << scale << " " << place;
+    EXPECT_EQ(median_of(values), sorted[5'000]);
+    EXPECT_EQ(quantile_of(values, 0.3), sorted[2'999]);
+  }
 }
 
 }  // namespace
