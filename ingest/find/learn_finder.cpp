@@ -15,6 +15,7 @@
 #include "ingest/find/bed_light.hpp"
 #include "ingest/find/candidates.hpp"
 #include "ingest/find/learned_beads.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
@@ -64,10 +65,7 @@ void drop_plain_background(std::vector<SolidBorder>& borders, const GrayFrame& f
   for (std::size_t k = 0; k < open.pixels.size(); k += step)
     if (!unseen(open.pixels[k])) levels.push_back(open.pixels[k]);
   if (levels.empty()) return;
-  std::sort(levels.begin(), levels.end());
-  const auto level_of = [&](double part) {
-    return static_cast<double>(levels[static_cast<std::size_t>(part * static_cast<double>(levels.size() - 1))]);
-  };
+  const auto level_of = [&](double part) { return static_cast<double>(quantile_of(levels, part)); };
   constexpr double outermost = 0.05, same = 0.25;
   const bool dark = polarity != Polarity::bright_beads;
   const double background = level_of(dark ? 1 - outermost : outermost),
