@@ -29,7 +29,7 @@ class BeadAsymmetry {
 
  private:
   // The harmonics of one distance: c_1, s_1, c_2, s_2 ...
-  using Ring = std::array<double, 2 * orders>;
+  using Ring = std::array<double, 2 * std::size_t{orders}>;
   Harmonics harmonics_;
   std::vector<Ring> rings_;
   double reach_ = 0;
