@@ -28,7 +28,7 @@ class BeadAsymmetry {
   void add_to_row(float* row, int left, int count, double x_px, double dy_px, float sign) const;
 
  private:
-  // The harmonics of one distance: c_1, s_1, c_2, s_2 ...
+  // The same harmonics, all of one distance beside one another, for at(): c_1, s_1, c_2, s_2 ...
   using Ring = std::array<double, 2 * std::size_t{orders}>;
   Harmonics harmonics_;
   std::vector<Ring> rings_;

@@ -40,20 +40,14 @@ struct DiskNodes {
   AtNodes r, weight;
 };
 DiskNodes nodes_over_disk(double radius, double blur, double distance) {
-  static const auto rule = [] {
-    const GaussLegendre computed = gauss_legendre(quadrature_nodes);
-    DiskNodes nodes;
-    std::copy(computed.node.begin(), computed.node.end(), nodes.r.begin());
-    std::copy(computed.weight.begin(), computed.weight.end(), nodes.weight.begin());
-    return nodes;
-  }();
+  static const GaussLegendre rule = gauss_legendre(quadrature_nodes);
   DiskNodes nodes{};
   const double low = std::max(0.0, distance - followed * blur), high = std::min(radius, distance + followed * blur);
   if (high <= low) return nodes;
   const double from = std::sqrt(radius - high), length = std::sqrt(radius - low) - from;
   const double inverse_square = 1 / (blur * blur), factor = 2 * length * inverse_square;
   for (std::size_t k = 0; k < quadrature_nodes; ++k) {  // in lanes
-    const double v = from + length * rule.r[k];
+    const double v = from + length * rule.node[k];
     const double r = radius - v * v, gap = r - distance;
     const double x = r * distance * inverse_square;
     nodes.r[k] = r;

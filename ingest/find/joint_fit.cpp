@@ -94,7 +94,7 @@ void ProfileTable::prepare_overlaps(double radius_px, double edge_px) {
   // Sums over the lens that two beads share, one at (0, 0), the other at (distance, 0): by symmetry the blocks are
   // diagonal. Beads nearer than overlap_from_px are on their way out; what they get need only be roughly right.
   // Distances are whole cells of one grid, so each bead's gradients are looked up once.
-  const double cell = edge_px < 1 ? 0.25 : 0.5;  // px
+  const double cell = edge_px < 1 ? 0.25 : 0.5;  // px: a part of the edge, in which the gradients lie
   const int from = static_cast<int>(1.4 * radius_px / cell), by = std::max(1, static_cast<int>(0.2 * edge_px / cell));
   overlap_from_px_ = from * cell, overlap_step_px_ = by * cell;
   const int rows = static_cast<int>(std::ceil(reach_ / cell)), columns = 2 * rows;

@@ -220,10 +220,7 @@ class FilmLearner {
   std::optional<Lens> better_lens() {
     straighten_all();
     std::vector<FindResult> found;
-    for (const GrayFrame& frame : straight_) {
-      const bool known = calibrated_.in_last_frame && &frame == &straight_.back();
-      found.push_back(known ? *calibrated_.in_last_frame : find_disks(frame, calibrated_.calibration, find_));
-    }
+    for (const GrayFrame& frame : straight_) found.push_back(find_disks(frame, calibrated_.calibration, find_));
     const LensEstimate left = estimate_lens(pointers_to(straight_), found, calibrated_.calibration);
     const MeasureOptions& options = film_.options;
     film_.aspect_std_error = options.pixel_aspect ? 0 : left.aspect_std_error;

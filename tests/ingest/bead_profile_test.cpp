@@ -418,6 +418,21 @@ TEST(RimFit, OfAnExactProfileIsExact) {
 }
 
 // A level outside that is not 0 is taken for an offset up to 0.006.
+// A rim that is more than a quarter of the radius and 1 px away is none of the bead that was seen.
+TEST(RimFit, OfARimFarFromTheGuessIsNone) {
+  BeadProfile profile;
+  profile.step_px = 0.05;
+  for (int k = 0; k <= 340; ++k)
+    profile.level.push_back(static_cast<float>(blurred_disk_contrast(
+        10, 1, [](double) { return 1.0; }, 0.05 * k)));
+  for (const double guess : {9.0, 11.0}) {
+    const RimFit near = fit_rim(profile, guess, 1);
+    EXPECT_TRUE(near.good) << guess;
+    EXPECT_NEAR(near.radius_px, 10, 2e-3) << guess;
+  }
+  for (const double guess : {6.0, 17.0}) EXPECT_FALSE(fit_rim(profile, guess, 1).good) << guess;
+}
+
 TEST(RimFit, TakesASmallLevelOutsideForAnOffset) {
   const auto radius_with = [](double offset) {
     BeadProfile profile;
