@@ -62,20 +62,14 @@ BedNumbers bed_numbers(const ShakenBed& bed, const EquationOfState& equation) {
 }
 
 // Mean jump heights of a bouncing ball against Gamma, for the way back. The mean is not monotone where the bounces are
-// chaotic: the answer is the lowest Gamma of the table's reach (1 to 30) at which it passes the height asked for.
+// chaotic: the answer is the lowest Gamma of the table's reach (1 to 30) at which it passes the height asked for. The
+// table grows as far as it is read.
 class BounceTable {
  public:
-  BounceTable(double restitution, const WaveForm& wave) {
-    for (double gamma = 1.0; gamma < 30.0; gamma *= 1.02) {
-      const BounceStatistics statistics =
-          bounce(gamma, {.restitution = restitution, .transient = 200, .flights = 400}, wave);
-      gammas_.push_back(gamma);
-      means_.push_back(statistics.mean_height);
-    }
-  }
-  [[nodiscard]] Value gamma(JumpHeight jump, double height) const {
+  BounceTable(double restitution, const WaveForm& wave) : restitution_(restitution), wave_(wave) {}
+  [[nodiscard]] Value gamma(JumpHeight jump, double height) {
     const auto kind = static_cast<std::size_t>(jump);
-    for (std::size_t i = 1; i < gammas_.size(); ++i) {
+    for (std::size_t i = 1; reaches(i); ++i) {
       const double low = means_[i - 1][kind];
       const double high = means_[i][kind];
       if (low <= height && high >= height) {
@@ -86,6 +80,17 @@ class BounceTable {
   }
 
  private:
+  bool reaches(std::size_t place) {
+    for (; gammas_.size() <= place && next_ < 30.0; next_ *= 1.02) {
+      gammas_.push_back(next_);
+      means_.push_back(
+          bounce(next_, {.restitution = restitution_, .transient = 200, .flights = 400}, wave_).mean_height);
+    }
+    return place < gammas_.size();
+  }
+
+  double restitution_, next_ = 1.0;
+  const WaveForm& wave_;
   std::vector<double> gammas_;
   std::vector<std::array<double, 4>> means_;
 };

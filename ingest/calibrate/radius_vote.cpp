@@ -198,7 +198,7 @@ class RadiusVote {
       if (column < 1 || row < 1 || column >= gradient_.width - 1 || row >= gradient_.height - 1) continue;
       votes_[static_cast<std::size_t>(row) * width_ + static_cast<std::size_t>(column)] += edge.weight;
     }
-    std::fill(sums_.begin(), sums_.end(), 0.0F);
+    // The outermost rows and columns stay 0.
     for (std::size_t row = 1; row + 1 < height_; ++row) {
       const float* a = votes_.data() + (row - 1) * width_;
       const float* b = a + width_;
