@@ -50,10 +50,10 @@ void expect_compressibility(std::uint32_t rows, double phi, double expected, dou
 
 // 1,024 disks would be 0.05 % low at 0.70: what they miss goes as 1/N.
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottner) {
-  expect_compressibility(64, 0.40, 2.1514393, 50, 64, 5);
   expect_compressibility(64, 0.60, 3.663691, 50, 64, 5);
 }
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottnerAtOtherDensities) {
+  expect_compressibility(64, 0.40, 2.1514393, 50, 64, 5);
   expect_compressibility(64, 0.50, 2.7601235, 50, 64, 5);
   expect_compressibility(64, 0.70, 5.082362, 50, 64, 4);
 }
@@ -68,12 +68,12 @@ TEST(ElasticBed, KeepsItsEnergyAndNeverOverlaps) {
   scene.start_temperature = 5;
   const auto simulation = simulate(scene);
   double worst_overlap = 0;
-  while (simulation->counters().collisions() < 3'000'000) {
+  while (simulation->counters().collisions() < 1'000'000) {
     simulation->advance_to(simulation->time() + 20);
     worst_overlap = std::max(worst_overlap, simulation->largest_overlap());
   }
   const EnergyLedger ledger = simulation->energy();
-  expect_law("relative energy drift in 3e6 collisions", (ledger.kinetic + ledger.potential) / ledger.initial - 1, 0, 0,
+  expect_law("relative energy drift in 1e6 collisions", (ledger.kinetic + ledger.potential) / ledger.initial - 1, 0, 0,
              1e-11);
   expect_law("largest overlap [D]", worst_overlap, 0, 0, 1e-12);
 }

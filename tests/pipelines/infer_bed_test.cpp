@@ -52,7 +52,7 @@ TEST_F(InferBed, WritesTheRecipeOfTheBedThatWasFilmed) {
   const ProgramResult ran =
       infer("o", {"--frequency", "20 Hz", "--frame-rate", "480 Hz", "--beds", "20", "--set", "/stages/infer/rounds=0",
                   "--set", "/stages/infer/best=1", "--set", "/stages/infer/best_replicas=2", "--set",
-                  "/stages/infer/measure=0.5 s", "--set", "/stages/infer/settle=1 s"});
+                  "/stages/infer/measure=0.25 s", "--set", "/stages/infer/settle=0.5 s"});
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   EXPECT_NE(ran.out.find("agree with all"), std::string::npos) << ran.out;
   // The frames are measured in a run of their own before: its warnings are said once.

@@ -42,7 +42,7 @@ TEST(InferFilm, ComparesDisplacementsBetweenFrames) {
     EXPECT_EQ(ran.exit_code, 0) << ran.err;
     return NumberTable(folder / (out + "/search/beds.csv"));
   };
-  const NumberTable now = temperatures("now", 0), many = temperatures("many", 1000), few = temperatures("few", 10);
+  const NumberTable now = temperatures("now", 0), many = temperatures("many", 400), few = temperatures("few", 10);
   for (const char* name : {"temperature_x_without_flow_over_mg", "temperature_z_without_flow_over_mg"}) {
     double of_many = 0, of_few = 0;
     for (std::size_t bed = 0; bed < now.rows(); ++bed) {
@@ -51,7 +51,7 @@ TEST(InferFilm, ComparesDisplacementsBetweenFrames) {
       of_many += many(name, bed) / now(name, bed) / static_cast<double>(now.rows());
       of_few += few(name, bed) / now(name, bed) / static_cast<double>(now.rows());
     }
-    EXPECT_NEAR(of_many, 0.985, 0.015) << name;
+    EXPECT_NEAR(of_many, 0.97, 0.015) << name;
     EXPECT_LT(of_few, 0.85) << name;
   }
   EXPECT_NEAR(few("center_of_mass_rise", 3), now("center_of_mass_rise", 3), 0.1);
@@ -146,7 +146,7 @@ TEST(InferParts, TogetherAreTheWhole) {
   const ScratchFolder folder;
   Json json = recipe();
   Json& stage = json["stages"][0];
-  stage["first"] = 41;
+  stage["first"] = 33;
   ASSERT_EQ(run(folder.path(), json, "whole").exit_code, 0);
   stage["parts"] = 2;
   Json sweep = json;
@@ -154,8 +154,8 @@ TEST(InferParts, TogetherAreTheWhole) {
   const ProgramResult swept = run(folder.path(), sweep, "parts");
   ASSERT_EQ(swept.exit_code, 0) << swept.err;
   const NumberTable beds(folder / "parts/sweep.csv");
-  EXPECT_EQ(beds("search_beds", 0), 20);
-  EXPECT_EQ(beds("search_beds", 1), 21);
+  EXPECT_EQ(beds("search_beds", 0), 16);
+  EXPECT_EQ(beds("search_beds", 1), 17);
   stage.erase("parts");
   stage["beds"] = "parts/points/*/search/beds.json";
   const ProgramResult ran = run(folder.path(), json, "together");
