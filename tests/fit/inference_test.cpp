@@ -99,6 +99,23 @@ TEST(Surrogate, PredictsManyPointsAsOneByOne) {
   }
 }
 
+// The lengths are those of the values: short for the parameter along which they go up and down, and longer than its
+// whole range for the one that does not matter. A search that ends at its first step finds lengths about 1.
+TEST(Surrogate, FindsTheLengthOfEachParameter) {
+  TrainingSet runs;
+  runs.parameters = 2, runs.outputs = 1;
+  std::mt19937_64 generator(12);
+  for (int r = 0; r < 50; ++r) {
+    const double x = even_number(generator), y = even_number(generator);
+    runs.points.insert(runs.points.end(), {x, y});
+    runs.values.push_back(std::sin(12 * x) + 0.05 * normal_quantile(even_number(generator)));
+  }
+  const Surrogate surrogate = Surrogate::train(runs);
+  EXPECT_LT(surrogate.lengths()[0], 0.3);
+  EXPECT_GT(surrogate.lengths()[1], 1.5);
+  EXPECT_NEAR(surrogate.scatter(0) / 0.05, 1, 0.4) << "of 50 runs, 4 standard errors";
+}
+
 TEST(Surrogate, NeedsRunsEnough) {
   TrainingSet few = stand_in_runs(10, 0, 1);
   EXPECT_THROW(Surrogate::train(few), std::invalid_argument);

@@ -52,6 +52,20 @@ TEST(DrawnPixels, OfASharpDiskAreTheirCoveredShares) {
     }
 }
 
+// A shaded disk in the middle of a frame is the same from all four sides, its cut pixels too.
+TEST(DrawnPixels, OfAShadedDiskAreTheSameFromEverySide) {
+  Camera camera = unrounded(31, 31);
+  camera.shading = BeadShading::shaded, camera.shading_depth = 0.4;
+  const GrayFrame frame = render_frame({{15, 15, 6.4, 0, 0}}, camera);
+  for (int row = 0; row < 31; ++row)
+    for (int column = 0; column < 31; ++column) {
+      const double here = contrast_at(frame, camera, column, row);
+      ASSERT_NEAR(here, contrast_at(frame, camera, 30 - column, row), 1e-5) << column << ' ' << row;
+      ASSERT_NEAR(here, contrast_at(frame, camera, column, 30 - row), 1e-5) << column << ' ' << row;
+      ASSERT_NEAR(here, contrast_at(frame, camera, row, column), 1e-5) << column << ' ' << row;
+    }
+}
+
 // The mean over the pixel of the blurred disk, by 12 x 12 points of the definition.
 TEST(DrawnPixels, OfABlurredDiskAreMeansOverThePixel) {
   for (const double blur : {0.25, 0.5, 1.2}) {

@@ -237,6 +237,9 @@ TEST_F(FilmPage, FollowsDisksThatAreNearestToEachOther) {
   EXPECT_EQ(step(5), none);
   EXPECT_EQ(step(6), std::pair(25U, 76U)) << "the nearest is not the one straight above";
   EXPECT_EQ(step(7), none) << "frame 6 has no disks";
+  add(6, 1.25, 1);
+  write_text(folder_ / "extract/disks.csv", rows);
+  EXPECT_EQ(bytes_of(data()["disks"])[10 * 7 + 8], 191U) << "half of 0.5 D to the right, although frame 7 has no disks";
 }
 
 TEST_F(FilmPage, IsLeftOutWhereTheStageKeptNoPictures) { EXPECT_EQ(film_viewer(stage_), ""); }

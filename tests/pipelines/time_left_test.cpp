@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "pipelines/formats/duration.hpp"
@@ -102,6 +104,22 @@ TEST(SweepProgress, NamesNothingWhereAllAreAlike) {
   progress.trials([] { return false; });
   EXPECT_TRUE(progress.long_points().empty());
   EXPECT_TRUE(progress.seconds_left());  // before anything ran
+}
+
+// Of two points that were expected to take very long, most of the first is done at once.
+TEST(SweepProgress, LearnsFromAPointWhileItRuns) {
+  const Sweep sweep(recipe(R"(["20000 s", "19999 s"])"));
+  SweepProgress progress(sweep.plan, sweep.all(), 1);
+  progress.trials([] { return false; });
+  ASSERT_TRUE(progress.seconds_left());
+  const double expected = *progress.seconds_left();
+  EXPECT_GT(expected, 10);
+  progress.begin(0);
+  for (const double fraction : {0.0, 0.25, 0.5, 0.75}) {
+    progress.reached(0, "bed", fraction);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_LT(*progress.seconds_left(), 0.7 * expected);
 }
 
 // The trial is not made for what the user has interrupted.
