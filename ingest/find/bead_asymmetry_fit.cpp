@@ -30,11 +30,9 @@ class HarmonicSums {
   explicit HarmonicSums(double reach)
       : reach_(reach),
         rings_(static_cast<std::size_t>(std::ceil(reach / ring_px)) + 1),
-        cosine_(rings_),
-        sine_(rings_),
-        weight_(rings_) {
-    for (auto* sums : {&cosine_, &sine_, &weight_})
-      for (auto& ring : *sums) ring.fill(0);
+        sums_(rings_),
+        weight_(rings_, 0.0) {
+    for (Ring& ring : sums_) ring.fill(0);
   }
   [[nodiscard]] std::size_t rings() const { return rings_; }
 
@@ -57,9 +55,9 @@ class HarmonicSums {
     double cosine = 0, sine = 0, variance = 0;
   };
   [[nodiscard]] std::optional<Mean> mean(std::size_t ring, std::size_t order) const {
-    const double weight = weight_[ring][order];
+    const double weight = weight_[ring];
     if (!(weight > 0)) return std::nullopt;
-    return Mean{share_taken_over * cosine_[ring][order] / weight, share_taken_over * sine_[ring][order] / weight,
+    return Mean{share_taken_over * sums_[ring][order] / weight, share_taken_over * sums_[ring][orders + order] / weight,
                 weight};
   }
 
@@ -70,23 +68,29 @@ class HarmonicSums {
     const double place = r / ring_px, cosine = dx / r, sine = dy / r;
     const auto k = std::min(rings_ - 2, static_cast<std::size_t>(place));
     const double outer = place - static_cast<double>(k);
-    double c = cosine, s = sine;
-    for (std::size_t m = 0; m < orders; ++m) {
-      cosine_[k][m] += (1 - outer) * e * c;
-      cosine_[k + 1][m] += outer * e * c;
-      sine_[k][m] += (1 - outer) * e * s;
-      sine_[k + 1][m] += outer * e * s;
-      weight_[k][m] += 0.5 * (1 - outer);
-      weight_[k + 1][m] += 0.5 * outer;
-      const double next = c * cosine - s * sine;
-      s = s * cosine + c * sine;
-      c = next;
+    Ring harmonic;
+    harmonic[0] = cosine, harmonic[orders] = sine;
+    for (std::size_t m = 1; m < orders; ++m) {
+      harmonic[m] = harmonic[m - 1] * cosine - harmonic[orders + m - 1] * sine;
+      harmonic[orders + m] = harmonic[orders + m - 1] * cosine + harmonic[m - 1] * sine;
     }
+    const double to_inner = (1 - outer) * e, to_outer = outer * e;
+    Ring &inner_ring = sums_[k], &outer_ring = sums_[k + 1];
+    for (std::size_t m = 0; m < harmonic.size(); ++m) {
+      inner_ring[m] += to_inner * harmonic[m];
+      outer_ring[m] += to_outer * harmonic[m];
+    }
+    weight_[k] += 0.5 * (1 - outer);
+    weight_[k + 1] += 0.5 * outer;
   }
+
+  // Of each order the sum with the cosine, then those with the sine.
+  using Ring = std::array<double, 2 * orders>;
 
   double reach_;
   std::size_t rings_;
-  std::vector<std::array<double, orders>> cosine_, sine_, weight_;
+  std::vector<Ring> sums_;
+  std::vector<double> weight_;
 };
 
 }  // namespace
