@@ -162,6 +162,7 @@ def test_control_c_ends_a_measurement_on_several_threads():
     process.stdout.close()
 
 
+@pytest.mark.long
 def test_frames_in_memory_are_read_where_they_lie():
     code = (
         "import resource, sys, shakebed; sys.path.insert(0, sys.argv[1]); from conftest import drawn_image\n"
@@ -189,6 +190,7 @@ def test_memory_does_not_grow_with_images():
     assert growth(work) < 8000  # a leak of one image a call would be 45,000 bytes
 
 
+@pytest.mark.long
 def test_twelve_lines_go_from_photographs_to_a_plot(frames, tmp_path):
     pytest.importorskip("matplotlib")
     script = pathlib.Path(__file__).resolve().parents[2] / "examples" / "python" / "photographs_to_plot.py"
