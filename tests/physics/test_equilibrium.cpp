@@ -49,9 +49,7 @@ void expect_compressibility(std::uint32_t rows, double phi, double expected, dou
 }
 
 // 1,024 disks would be 0.05 % low at 0.70: what they miss goes as 1/N.
-TEST(PeriodicFluid, HasThePressureOfKolafaAndRottner) {
-  expect_compressibility(64, 0.60, 3.663691, 50, 64, 5);
-}
+TEST(PeriodicFluid, HasThePressureOfKolafaAndRottner) { expect_compressibility(64, 0.60, 3.663691, 50, 64, 5); }
 TEST(PeriodicFluid, HasThePressureOfKolafaAndRottnerAtOtherDensities) {
   expect_compressibility(64, 0.40, 2.1514393, 50, 64, 5);
   expect_compressibility(64, 0.50, 2.7601235, 50, 64, 5);

@@ -180,8 +180,7 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[7] = resting_bed(0.5);
   for (std::size_t k = 0; k < scenes.size(); ++k)
     k < 6 ? expect_resumes(scenes[k], 10, 18) : expect_resumes(scenes[k], 30, 55);
-  for (std::uint64_t seed = 0; seed < 4; ++seed)
-    expect_resumes(random_stack(seed), 6, 9);  // some of the disks at rest
+  for (std::uint64_t seed = 0; seed < 4; ++seed) expect_resumes(random_stack(seed), 6, 9);  // some of the disks at rest
 }
 
 // Below Gamma = 1 nothing moves against anything once it has come to rest, and nothing is done for it.
