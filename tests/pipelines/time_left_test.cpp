@@ -113,7 +113,7 @@ TEST(SweepProgress, LearnsFromAPointWhileItRuns) {
   progress.trials([] { return false; });
   ASSERT_TRUE(progress.seconds_left());
   const double expected = *progress.seconds_left();
-  EXPECT_GT(expected, 10);
+  EXPECT_GT(expected, 1) << "the sleeps below last 0.04 s";
   progress.begin(0);
   for (const double fraction : {0.0, 0.25, 0.5, 0.75}) {
     progress.reached(0, "bed", fraction);

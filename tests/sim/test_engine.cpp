@@ -180,7 +180,8 @@ TEST(Engine, GoesOnFromACheckpointToTheSameBytes) {
   scenes[7] = resting_bed(0.5);
   for (std::size_t k = 0; k < scenes.size(); ++k)
     k < 6 ? expect_resumes(scenes[k], 10, 18) : expect_resumes(scenes[k], 30, 55);
-  for (std::uint64_t seed = 0; seed < 4; ++seed) expect_resumes(random_stack(seed), 6, 9);  // some of the disks at rest
+  for (const std::uint64_t seed : {0, 2, 3}) expect_resumes(random_stack(seed), 6, 18);  // some of the disks at rest
+  expect_resumes(random_stack(1), 6, 12);                                                // chatters
 }
 
 // Below Gamma = 1 nothing moves against anything once it has come to rest, and nothing is done for it.
@@ -619,7 +620,7 @@ TEST(Engine, KeepsItsOrderThroughBursts) {
   scene.box.floor = SinusoidalFloor{200, 0.02};  // flies for tens of time units, then lands all at once
   scene.box.floor_surface = {0.7, 0, 0};
   const auto bed = simulate(scene);
-  for (double time = 3; time < 61; time += 3) {
+  for (double time = 3; time < 120; time += 3) {
     bed->advance_to(time);
     ASSERT_LE(bed->largest_overlap(), 1e-12) << "time " << time;
   }
