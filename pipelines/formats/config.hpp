@@ -102,6 +102,7 @@ class Fields {
     std::string file;                      // for messages
     std::filesystem::path directory = {};  // relative paths are resolved against it
     std::vector<Problem>* problems = nullptr;
+    std::size_t problems_before = 0;           // those of the document that are not of this stage
     std::vector<Warning>* warnings = nullptr;  // what is odd but not wrong; may be left out
     // Every input file that was named: pointer and file.
     std::vector<std::pair<std::string, std::string>>* input_files = nullptr;
@@ -210,8 +211,10 @@ class Fields {
   const JsonNode* written(std::string_view key) const { return node_ != nullptr ? node_->find(key) : nullptr; }
   // Whether the key was written (decoding only).
   bool has(std::string_view key) const;
-  // Number of problems so far in the whole document.
-  std::size_t problem_count() const { return source_.problems != nullptr ? source_.problems->size() : 0; }
+  // Number of problems so far in this stage.
+  std::size_t problem_count() const {
+    return source_.problems != nullptr ? source_.problems->size() - source_.problems_before : 0;
+  }
 
  private:
   Fields(Mode mode, const JsonNode* node, Json* out, std::string pointer, Source source)

@@ -320,6 +320,7 @@ class PlanBuilder {
     planned.stage = draft.row->make();
     Fields::Source source = source_;
     source.input_files = &planned.input_files;
+    source.problems_before = problems_.size();
     for (const std::size_t k : draft.arrows) {
       planned.from.push_back(position_[k]);
       const PlannedStage& before = plan_.stages[position_[k]];

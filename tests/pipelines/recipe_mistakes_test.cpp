@@ -141,6 +141,17 @@ TEST(RecipeMistakes, OneGivesOneError) {
   EXPECT_EQ(
       told(with(R"({ "stage": "map", "gama": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 })")),
       "/stages/0/gama: unknown key \"gama\". Did you mean \"gamma\"?");
+  // What other stages give is known none the less.
+  const std::string study =
+      R"({ "stage": "study", "parameter": { "name": "g", "values": [4], "set": ["/stages/map/gamma"] },
+           "series": { "slow": { "set": { "/stages/map/frequency": "10 Hz" } }, "fast": {} },
+           "stages": [)" +
+      map_stage() + R"(], "collect": { "T": { "at": "/map/critical_temperature" } } },
+         { "stage": "claims", "from": "study",
+           "claims": [{ "claim": "c", "value": 1, "number": "/study/series/slow/0/T" }] })";
+  EXPECT_EQ(told(with(study)), "");
+  EXPECT_EQ(told(with(map_stage(R"(, "id": "other", "gama": 4)") + "," + study)),
+            "/stages/0/gama: unknown key \"gama\". Did you mean \"gamma\"?");
   const std::string two =
       told(with(R"({ "stage": "map", "gamma": -4, "frequency": "20 mm", "diameter": "3 mm", "initial_height": 10 })"));
   EXPECT_THAT(two, HasSubstr("/stages/0/gamma: must be "));
