@@ -206,6 +206,8 @@ TEST(Sizes, BeadsOfTwoGivenDiametersAreFoundAtEveryRatio) {
     for (const bool bright : {false, true})
       for (const bool large_first : {false, true}) {
         std::mt19937 random(seed++);
+        // Every pair of two of the three choices, not every three.
+        if (large_first == (bright != (ratio == 1.6))) continue;
         expect_both_kinds(test::bed_of_two_sizes(random, ratio, 0.5, large_px), {ratio, bright, large_first});
         expect_both_kinds(test::strewn_of_two_sizes(random, ratio, 0.5, large_px), {ratio, bright, large_first});
       }

@@ -11,7 +11,7 @@ printed() {
   name=$1 runner=$2
   shift 2
   "$cmake" -S "$tree/tests/install/machines" -B "$work/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release \
-    -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=8 "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG" "-DSHAKEBED_TREE=$tree" \
+    -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0 "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG" "-DSHAKEBED_TREE=$tree" \
     "$@" >"$work/$name.log" 2>&1 || { cat "$work/$name.log" >&2; return 1; }
   "$cmake" --build "$work/$name" --target machine_bytes >"$work/$name.log" 2>&1 || { cat "$work/$name.log" >&2; return 1; }
   # shellcheck disable=SC2086

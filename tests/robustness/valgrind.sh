@@ -28,9 +28,6 @@ cat >sweep.json <<END
 { "name": "sweep", "stages": [ $bed ],
   "sweep": { "over": { "/stages/bed/disks/restitution": [0.7, 0.8] } } }
 END
-cat >cluster.json <<END
-{ "name": "cluster", "stages": [ $bed ], "sweep": { "over": { "/stages/bed/disks/restitution": [0.7, 0.8] } } }
-END
 # Beds of 20 disks over two parameters, and the sampling of their posterior.
 cat >infer.json <<END
 { "name": "infer", "stages": [ { "stage": "infer", "units": "reduced", "disks": { "count": 20, "restitution": 0.7 },
@@ -85,14 +82,16 @@ check explain 0 explain bed.json --out results/bed
 check graph 0 graph bed.json
 check status 0 status results/bed
 check verify 0 verify results/bed
-check rerun "0 6" rerun results/bed --out again
 check fit-profile 0 fit-profile results/bed/bed/profile.csv --out profile
+[ -d results/sweep ] || "$program" run sweep.json --out results/sweep --quiet >/dev/null 2>&1
+check rerun "0 6" rerun results/sweep --out again
 check fit-images 0 fit-images results/bed/render/frames --diameter "3 mm" --out images
 check infer 0 run infer.json --out results/infer
-# Settled shortly: what it finds is not the question.
+# Settled shortly, at the values about the edge alone: what it finds is not the question.
 check reproduce "0 6" reproduce bouncing-ball --preset quick --out figure --set /stages/e0/stages/0/settle=60 \
-  --set /stages/e5/stages/0/settle=60 --set /stages/e10/stages/0/settle=60 --set /stages/bed/settle=60
-check submit 0 submit slurm cluster.json --out cluster --dry-run
+  --set /stages/e5/stages/0/settle=60 --set /stages/e10/stages/0/settle=60 --set /stages/bed/settle=60 \
+  --set '/stages/e0/parameter/values=[3.72,3.73]' --set '/stages/e5/parameter/values=[3.37,3.38]' --set '/stages/e10/parameter/values=[3.06,3.07]'
+check submit 0 submit slurm sweep.json --out cluster --dry-run
 check bench "0 6" bench fit --quick --out bench
 check clean 0 clean results
 exit $failed
