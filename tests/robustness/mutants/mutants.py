@@ -7,7 +7,8 @@
   mutants.py report                            counts by room and the faults that no test noticed
 
 The table (--table, default mutants.csv in the work folder) holds one fault a line with its state: waiting, noticed, not at
-first (the quickest tests of the room did not notice it), survived, not built, not in a program, misplaced. The work folder
+first (the quickest tests of the room did not notice it), survived, noticed by a long test, survived the long tests, not
+built, not in a program, misplaced. The work folder
 (--work, default build/mutants) holds programs for each job, linked from a finished release build (--build). The standard
 library of Python 3.9 is enough.
 """
@@ -47,6 +48,11 @@ PROGRAMS = {
     "pipelines_images_test": "tests/pipelines/pipelines_images_test",
     "test_physics": "tests/physics/test_physics",
     "test_robustness": "tests/robustness/test_robustness",
+}
+# Programs of long tests alone; asked with --part long, together with the long tests of the others.
+LONG_PROGRAMS = {
+    "test_reproduction": "tests/reproduction/test_reproduction",
+    "followed_advice_test": "tests/pipelines/followed_advice_test",
 }
 # Programs with the tests of a room.
 OWN = {
@@ -295,14 +301,14 @@ class Bench:
         if code != 0:
             sys.exit(f"{command}\n{output[-3000:]}")
 
-    def prepare(self):
+    def prepare(self, programs):
         log, first = self.base / ".ninja_log", self.work / "prepared"
         if log.exists() and (not first.exists() or first.stat().st_mtime < log.stat().st_mtime):
             shutil.rmtree(self.work, ignore_errors=True)  # linked from the objects of an earlier build, or in part
         for name in ("bin", "lib/shakebed", "objects"):
             (self.work / name).mkdir(parents=True, exist_ok=True)
         shutil.rmtree(self.overlay, ignore_errors=True)
-        targets = [*PROGRAMS.values(), "pipelines/shakebed", "shakebed_images"]
+        targets = [*programs.values(), "pipelines/shakebed", "shakebed_images"]
         self.read_links(targets)
         self.read_sources()
         self.shared = {}  # archive: the shared library that takes its place, and its objects
@@ -543,7 +549,34 @@ class Bench:
             for output in self.changed_programs:
                 os.replace(self.sound(Path(output).name), self.program(output))
 
+    def ask_long(self, row):
+        """The long tests of the programs of the room and of those above, and those that start the program, the quickest
+        first. Of other tests (packages, browsers' libraries, fuzzing) none is asked."""
+        before = self.cpu
+        for name, command, usual in long_tests(self, row["room"]):
+            if self.limit and self.cpu - before > self.limit:
+                return "survived the long tests", f"{name} and what follows were not asked"
+            if name in self.unfit:
+                continue
+            code, _, cpu = run_limited(command, 600 + 60 * usual, cwd=self.work / "bin")
+            self.cpu += cpu
+            if code in (0, 77):
+                continue
+            aside = self.fault.with_suffix(".aside")
+            os.replace(self.fault, aside)
+            self.no_fault()
+            code, _, cpu = run_limited(command, 600 + 60 * usual, cwd=self.work / "bin")
+            self.cpu += cpu
+            os.replace(aside, self.fault)
+            if code in (0, 77):
+                return "noticed by a long test", name
+            self.unfit.add(name)
+            print(f"{name} fails without a fault: not used", flush=True)
+        return "survived the long tests", ""
+
     def ask(self, row, times, part):
+        if part == "long":
+            return self.ask_long(row)
         spent = 0
         for program, tests, usual in groups_of(row, times, part, remembered_tests(row, self.remembered)):
             if self.limit and spent > self.limit:
@@ -587,8 +620,25 @@ def quick_filter(base, program):
     return "*"
 
 
-def usual_times(bench):
-    """Seconds of every quick test without a fault, as ctest has written them down: {program: {test: seconds}}."""
+def long_tests(bench, room):
+    """(name, command, usual seconds) of the long tests that a fault of a room is put to, the quickest first."""
+    listed = json.loads(subprocess.run(["ctest", "--test-dir", str(bench.base), "-L", "long", "--show-only=json-v1"],
+                                       check=True, capture_output=True, text=True).stdout)["tests"]
+    costs = recorded_costs(bench)
+    programs = {str(bench.base / place): bench.work / "bin" / name
+                for name, place in {**PROGRAMS, **LONG_PROGRAMS}.items()
+                if name in (*LONG_PROGRAMS, *OWN[room], *ORDER[room])}
+    programs[str(bench.base / "pipelines/shakebed")] = bench.work / "bin/shakebed"
+    found = []
+    for test in listed:
+        command = [str(programs.get(word, word)) for word in test["command"]]
+        if command != test["command"]:
+            found.append((test["name"], command, costs.get(test["name"], 60.0)))
+    return sorted(found, key=lambda one: one[2])
+
+
+def recorded_costs(bench):
+    """Seconds of every test without a fault, as ctest has written them down."""
     costs = {}
     for name in ("Testing/Temporary/CTestCostData.txt", "CTestCostData.txt"):
         if (bench.base / name).exists():
@@ -596,6 +646,12 @@ def usual_times(bench):
                 words = line.split()
                 if len(words) == 3:
                     costs[words[0]] = float(words[2])
+    return costs
+
+
+def usual_times(bench):
+    """Seconds of every quick test without a fault, as ctest has written them down: {program: {test: seconds}}."""
+    costs = recorded_costs(bench)
     times = {}
     for program, place in PROGRAMS.items():
         listed = subprocess.run([str(bench.work / "bin" / program), "--gtest_list_tests",
@@ -661,7 +717,8 @@ def groups_of(row, times, part, remembered=((), ())):
 
 def run(arguments):
     rows = read_table(arguments.table)
-    states = {"first": ("waiting",), "rest": ("not at first",), "all": ("waiting", "not at first")}[arguments.part]
+    states = {"first": ("waiting",), "rest": ("not at first",), "all": ("waiting", "not at first"),
+              "long": ("survived",)}[arguments.part]
     waiting = [row for row in rows if row["state"] in states and arguments.room in (None, row["room"])
                and (arguments.suffix is None or row["file"].endswith(arguments.suffix))
                and (arguments.only is None or row["id"] in arguments.only)]
@@ -671,8 +728,8 @@ def run(arguments):
     for bench in benches:
         bench.limit = arguments.limit
         bench.remembered = read_table(RESULTS) + rows
-        bench.prepare()
-    times = usual_times(benches[0])
+        bench.prepare({**PROGRAMS, **LONG_PROGRAMS} if arguments.part == "long" else PROGRAMS)
+    times = {} if arguments.part == "long" else usual_times(benches[0])
 
     def work(bench):
         while True:
@@ -702,13 +759,15 @@ def run(arguments):
 
 def report(arguments):
     rows = read_table(arguments.table)
-    print("| room | noticed | not at first | survived | not built | waiting |\n|---|---|---|---|---|---|")
+    columns = ("noticed", "noticed by a long test", "not at first", "survived", "survived the long tests", "not built",
+               "waiting")
+    print(f"| room | {' | '.join(columns)} |\n|{'---|' * (len(columns) + 1)}")
     for room in ROOMS:
         states = [row["state"] for row in rows if row["room"] == room]
-        counts = [states.count(state) for state in ("noticed", "not at first", "survived", "not built", "waiting")]
+        counts = [states.count(state) for state in columns]
         print(f"| {room} | {' | '.join(map(str, counts))} |")
     for row in rows:
-        if row["state"] in ("not at first", "survived"):
+        if row["state"] in ("not at first", "survived", "survived the long tests"):
             print(f"{row['id']} {row['file']}:{row['line']} {row['kind']}: {row['before']!r} -> {row['after']!r}")
 
 
@@ -729,8 +788,9 @@ def main():
     judged.add_argument("--jobs", type=int, default=1)
     judged.add_argument("--hours", type=float, default=8)
     judged.add_argument("--build", type=Path, default=SOURCE / "build/release", help="a finished release build")
-    judged.add_argument("--part", choices=("first", "rest", "all"), default="all",
-                        help="only the quickest tests of the fault's room; only the others")
+    judged.add_argument("--part", choices=("first", "rest", "all", "long"), default="all",
+                        help="only the quickest tests of the fault's room; only the others; the long tests, of faults "
+                             "that survived (wants the target by_hand built)")
     judged.add_argument("--limit", type=float, help="CPU seconds after which no further tests are asked of a fault")
     judged.add_argument("--suffix", help="only faults in files that end so, .cpp or .hpp")
     judged.add_argument("--only", nargs="+", help="only these faults")
