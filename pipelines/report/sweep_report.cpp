@@ -182,15 +182,17 @@ class SweepFigures {
   std::vector<fs::path> operator()(const fs::path& folder) {
     std::vector<fs::path> figures;
     if (along_ == axes_.size()) return figures;
+    Drawings drawings(folder);
     for (std::size_t k = 0; k < sweep_.collected.size(); ++k) {
       if (is_end_of_range(k)) continue;
       const Picture picture = picture_of(k);
       if (picture.series.empty()) continue;
       const std::string name = fmt::format("sweep-{}", k + 1);
       fs::create_directories(folder);
-      draw_picture(picture, folder, name);
+      drawings.add(picture, name);
       figures.push_back(folder / (name + ".svg"));
     }
+    if (!figures.empty()) drawings.draw();
     return figures;
   }
 

@@ -337,8 +337,8 @@ class Chart : public Stage {
   void run(RunContext& context) const override;
 
  private:
-  Json draw(const RunContext& context, const ChartOptions& chart) const;
-  Json snapshot(const RunContext& context, const SnapshotOptions& snapshot) const;
+  Json draw(const RunContext& context, const ChartOptions& chart, Drawings& drawings) const;
+  Json snapshot(const RunContext& context, const SnapshotOptions& snapshot, Drawings& drawings) const;
   std::vector<ChartOptions> charts_;
   std::vector<MapOptions> maps_;
   std::vector<SnapshotOptions> snapshots_;
@@ -601,7 +601,7 @@ void Chart::describe(Fields& fields) {
                    "there is nothing to draw: no charts, no maps, no snapshots");
 }
 
-Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
+Json Chart::draw(const RunContext& context, const ChartOptions& chart, Drawings& drawings) const {
   Picture picture = empty_picture(chart);
   Json out = Json::object();
   if (!chart.caption.empty()) out["caption"] = chart.caption;
@@ -627,11 +627,11 @@ Json Chart::draw(const RunContext& context, const ChartOptions& chart) const {
   for (const CurveOptions& curve : chart.curves) {
     if (!curve.label.empty() && curve.look != Look::none) add_curve(curve, picture);
   }
-  draw_picture(picture, context.output_directory(), chart.name);
+  drawings.add(picture, chart.name);
   return out;
 }
 
-Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) const {
+Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options, Drawings& drawings) const {
   TrajectoryReader reader(context.input_from(options.from).file("final.extxyz"));
   TrajectoryFrame frame;
   if (!reader.read(frame))
@@ -657,7 +657,7 @@ Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) 
     picture.color.push_back(std::hypot(order.psi6_re[i], order.psi6_im[i]));
     crystal += picture.color.back() >= 0.8;
   }
-  draw_disks(picture, context.output_directory(), options.name);
+  drawings.add(picture, options.name);
   Json out{{"disks", frame.size()}, {"empty_sites", order.vacancy_x.size()}, {"disks_with_psi6_above_0.8", crystal}};
   if (!options.caption.empty()) out["caption"] = options.caption;
   return out;
@@ -665,9 +665,11 @@ Json Chart::snapshot(const RunContext& context, const SnapshotOptions& options) 
 
 void Chart::run(RunContext& context) const {
   Json out = Json::object();
-  for (const ChartOptions& chart : charts_) out[chart.name] = draw(context, chart);
-  for (const MapOptions& map : maps_) out[map.name] = draw_map(context, map);
-  for (const SnapshotOptions& one : snapshots_) out[one.name] = snapshot(context, one);
+  Drawings drawings(context.output_directory());
+  for (const ChartOptions& chart : charts_) out[chart.name] = draw(context, chart, drawings);
+  for (const MapOptions& map : maps_) out[map.name] = draw_map(context, map, drawings);
+  for (const SnapshotOptions& one : snapshots_) out[one.name] = snapshot(context, one, drawings);
+  drawings.draw();
   write_file(context.output("chart.json"), dump(out));
 }
 

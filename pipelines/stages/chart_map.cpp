@@ -167,7 +167,7 @@ void state_map(ResultList& list, const MapOptions& map) {
     list.number(pointer_join(at + "/marked", mark.label), "1", "number of cells with this mark");
 }
 
-Json draw_map(const RunContext& context, const MapOptions& map) {
+Json draw_map(const RunContext& context, const MapOptions& map, Drawings& drawings) {
   const StudyTable table = read_study_table(context.input_from(map.from).file(map.file));
   const std::vector<MapPoint> points = points_of(map, table);
   if (points.empty())
@@ -198,7 +198,7 @@ Json draw_map(const RunContext& context, const MapOptions& map) {
     out["marked"][map.marks[k].label] = count;
     if (count > 0) picture.marks.emplace_back(map.marks[k].label, k);
   }
-  draw_cells(picture, context.output_directory());
+  drawings.add(picture);
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipelines/stages/figure.hpp"
 #include "pipelines/stages/stage.hpp"
 
 namespace shakebed::pipelines {
@@ -29,7 +30,7 @@ struct MapOptions {
 
 void describe_map(Fields& fields, MapOptions& map);
 void state_map(ResultList& list, const MapOptions& map);
-// Draws NAME.svg and NAME.pdf with NAME.dat and NAME.gp beside them; what chart.json says of the map.
-Json draw_map(const RunContext& context, const MapOptions& map);
+// Adds the map to the drawings; what chart.json says of it.
+Json draw_map(const RunContext& context, const MapOptions& map, Drawings& drawings);
 
 }  // namespace shakebed::pipelines

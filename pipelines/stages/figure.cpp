@@ -132,25 +132,36 @@ void remove_date(const std::filesystem::path& pdf) {
 
 }  // namespace
 
-void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script) {
-  write_file(directory / (name + ".gp"), script);
+void Drawings::add_script(const std::string& name, const std::string& script) {
+  write_file(directory_ / (name + ".gp"), script);
+  names_.push_back(name);
+}
+
+void Drawings::draw() const {
+  std::vector<std::string> command{"env", "SOURCE_DATE_EPOCH=0", "gnuplot"};
+  for (const std::string& name : names_) {
+    if (name != names_.front()) command.insert(command.end(), {"-e", "reset session"});
+    command.push_back(name + ".gp");
+  }
   ProcessResult result;
   try {
-    result = run_process({"env", "SOURCE_DATE_EPOCH=0", "gnuplot", name + ".gp"}, directory);
+    result = run_process(command, directory_);
   } catch (const StageError& error) {
     throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", error.what()));
   }
   if (result.exit_code == 127)
     throw StageError(fmt::format("{}; figures need gnuplot (Debian: gnuplot-nox)", result.output));
-  for (const char* kind : {".svg", ".pdf"}) {
-    std::error_code error;
-    const auto size = std::filesystem::file_size(directory / (name + kind), error);
-    if (result.exit_code != 0 || error || size == 0) {
-      throw StageError(
-          fmt::format("gnuplot could not draw {}.gp (exit code {}): {}", name, result.exit_code, result.output));
+  for (const std::string& name : names_) {
+    for (const char* kind : {".svg", ".pdf"}) {
+      std::error_code error;
+      const auto size = std::filesystem::file_size(directory_ / (name + kind), error);
+      if (error || size == 0 || (result.exit_code != 0 && name == names_.back())) {
+        throw StageError(
+            fmt::format("gnuplot could not draw {}.gp (exit code {}): {}", name, result.exit_code, result.output));
+      }
     }
+    remove_date(directory_ / (name + ".pdf"));
   }
-  remove_date(directory / (name + ".pdf"));
 }
 
 namespace {
@@ -295,15 +306,15 @@ Sheets sheets_of(const Picture& picture) {
 
 }  // namespace
 
-void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name) {
+void Drawings::add(const Picture& picture, const std::string& name) {
   // gnuplot does not give an index to an empty block.
   Picture drawn = picture;
   const auto is_empty = [](const Series& series) { return series.x.empty(); };
   std::erase_if(drawn.series, is_empty);
   std::erase_if(drawn.lower, is_empty);
   if (drawn.series.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
-  write_file(directory / (name + ".dat"), data_blocks(drawn.series) + data_blocks(drawn.lower));
-  write_file(directory / (name + std::string(plot_data_suffix)), dump_canonical(plot_data(drawn)) + "\n");
+  write_file(directory_ / (name + ".dat"), data_blocks(drawn.series) + data_blocks(drawn.lower));
+  write_file(directory_ / (name + std::string(plot_data_suffix)), dump_canonical(plot_data(drawn)) + "\n");
 
   std::string body = frame_script(drawn);
   body += "set key above vertical maxrows key_rows Left reverse font keyfont spacing 1.2 samplen 1.5 width key_width\n";
@@ -311,7 +322,7 @@ void draw_picture(const Picture& picture, const std::filesystem::path& directory
   body += upper_panel(drawn, name);
   if (!drawn.lower.empty()) body += lower_panel(drawn, name);
   const Sheets sheets = sheets_of(drawn);
-  run_gnuplot(directory, name, twice(name, sheets.svg, sheets.pdf, body));
+  add_script(name, twice(name, sheets.svg, sheets.pdf, body));
 }
 
 namespace {
@@ -320,10 +331,10 @@ constexpr const char* lightness_palette =
     "set palette defined (0 '#00224e', 0.25 '#3b496c', 0.5 '#7b7b78', 0.75 '#bcae6c', 1 '#fee838')\n";
 }  // namespace
 
-void draw_cells(const MapPicture& picture, const std::filesystem::path& directory) {
+void Drawings::add(const MapPicture& picture) {
   const auto bound = [](const std::optional<double>& value) { return value ? number_text(*value) : "*"; };
   const std::string file = gnuplot_text(picture.name + ".dat");
-  write_file(directory / (picture.name + ".dat"), picture.data);
+  write_file(directory_ / (picture.name + ".dat"), picture.data);
   std::string body = fmt::format(
       "set xlabel {}\nset ylabel {}\nset cblabel {}\nset border lc rgb '#404040'\nset tics nomirror out\nset cbrange "
       "[{}:{}]\nset autoscale xfix\nset autoscale yfix\nset style fill solid 1 noborder\nset key above font keyfont\n",
@@ -344,10 +355,10 @@ void draw_cells(const MapPicture& picture, const std::filesystem::path& director
     body += fmt::format(", {0} index {1} using 1:2 with points pt {2} ps 0.7*scale lw 2 lc rgb '#D55E00' title {3}",
                         file, k + 1, symbol, gnuplot_text(plain(label)));
   }
-  run_gnuplot(directory, picture.name, twice(picture.name, {560, ""}, {170, ""}, body + "\n"));
+  add_script(picture.name, twice(picture.name, {560, ""}, {170, ""}, body + "\n"));
 }
 
-void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name) {
+void Drawings::add(const DiskPicture& picture, const std::string& name) {
   if (picture.x.empty()) throw StageError(fmt::format("there is nothing to draw in {}.svg", name));
   std::string data = "# disks: x y radius color\n";
   double top = 0;
@@ -359,7 +370,7 @@ void draw_disks(const DiskPicture& picture, const std::filesystem::path& directo
   for (std::size_t i = 0; i < picture.cross_x.size(); ++i)
     data += fmt::format("{} {}\n", picture.cross_x[i], picture.cross_y[i]);
   data += "\n\n";
-  write_file(directory / (name + ".dat"), data);
+  write_file(directory_ / (name + ".dat"), data);
   std::string body = fmt::format(
       "set xlabel {}\nset ylabel {}\nset cblabel {}\nset xrange [0:{}]\nset yrange [0:{}]\nset size ratio -1\nset "
       "border lc rgb '#404040'\nset tics nomirror out\nset cbrange [{}:{}]\n"
@@ -372,7 +383,7 @@ void draw_disks(const DiskPicture& picture, const std::filesystem::path& directo
     body += fmt::format(", {} index 1 using 1:2 with points pt 2 ps 1.3*scale lw 3 lc rgb '#D55E00' title {}",
                         gnuplot_text(name + ".dat"), gnuplot_text(plain(picture.cross_label)));
   const double shape = std::clamp((top + 8) / (picture.width + 10), 0.3, 2.0);
-  run_gnuplot(directory, name, twice(name, {svg_width * shape, ""}, {pdf_width * shape, ""}, body + "\n"));
+  add_script(name, twice(name, {svg_width * shape, ""}, {pdf_width * shape, ""}, body + "\n"));
 }
 
 namespace {
@@ -576,13 +587,12 @@ class ProfilePicture {
     }
   }
 
-  void draw(const std::optional<double>& highest) {
+  void draw(const std::optional<double>& highest, Drawings& drawings) {
     if (picture_.series.empty()) throw InputError("there is nothing to draw: \"from\" names no profile and no fit");
     picture_.x_low = 0;
     picture_.x_high = highest ? *highest : std::ceil(end_ + 0.5);
     picture_.y_low = 0;
-    context_.progress(0.3, "drawing");
-    draw_picture(picture_, context_.output_directory(), "profile");
+    drawings.add(picture_, "profile");
   }
 
   void write_comparisons() {
@@ -626,7 +636,7 @@ class ProfilePicture {
 };
 
 // Temperature against the lower edge of the window, of those windows whose fit succeeded.
-void draw_windows(const RunContext& context, const Input& fit) {
+void draw_windows(const Input& fit, Drawings& drawings) {
   const Curve all = read_columns(fit.file("windows.csv"), "low", "temperature", "std_error");
   Curve windows;
   for (std::size_t i = 0; i < all.x.size(); ++i) {
@@ -646,7 +656,7 @@ void draw_windows(const RunContext& context, const Input& fit) {
                             {t->get<double>(), t->get<double>()},
                             {}});
   }
-  draw_picture(sweep, context.output_directory(), "windows");
+  drawings.add(sweep, "windows");
 }
 
 void Figure::run(RunContext& context) const {
@@ -657,8 +667,11 @@ void Figure::run(RunContext& context) const {
   picture.find_end();
   if (reference_ == Reference::clement_rajchenbach) picture.add_published();
   picture.add_points(data_);
-  picture.draw(highest_);
-  if (const Input* fit = context.find_input("fit")) draw_windows(context, *fit);
+  Drawings drawings(context.output_directory());
+  picture.draw(highest_, drawings);
+  if (const Input* fit = context.find_input("fit")) draw_windows(*fit, drawings);
+  context.progress(0.3, "drawing");
+  drawings.draw();
   picture.write_comparisons();
 }
 

@@ -46,12 +46,22 @@ struct MapPicture {
   std::optional<std::pair<double, double>> decades_x{}, decades_y{};  // lowest and highest place of a logarithmic axis
   std::vector<std::pair<std::string, std::size_t>> marks{};           // label, number of the symbol
 };
-void draw_cells(const MapPicture& picture, const std::filesystem::path& directory);
-void draw_disks(const DiskPicture& picture, const std::filesystem::path& directory, const std::string& name);
-// Writes the script as NAME.gp and runs it; it must make NAME.svg and NAME.pdf. Throws StageError when it does not.
-void run_gnuplot(const std::filesystem::path& directory, const std::string& name, const std::string& script);
-// Writes NAME.dat, NAME.gp, NAME.svg, NAME.pdf and NAME.plot.json (what the page draws again, to be asked) into the
-// folder. Throws StageError when gnuplot is missing or fails.
-void draw_picture(const Picture& picture, const std::filesystem::path& directory, const std::string& name);
+// Pictures of one folder. Each is written as NAME.dat and its script NAME.gp, and draw() makes NAME.svg and NAME.pdf of
+// them all: gnuplot takes longer to start than to draw.
+class Drawings {
+ public:
+  explicit Drawings(std::filesystem::path directory) : directory_(std::move(directory)) {}
+  // Writes NAME.plot.json, too: what the page draws again, to be asked.
+  void add(const Picture& picture, const std::string& name);
+  void add(const DiskPicture& picture, const std::string& name);
+  void add(const MapPicture& picture);
+  void add_script(const std::string& name, const std::string& script);
+  // Throws StageError when gnuplot is missing or fails.
+  void draw() const;
+
+ private:
+  std::filesystem::path directory_;
+  std::vector<std::string> names_;
+};
 
 }  // namespace shakebed::pipelines

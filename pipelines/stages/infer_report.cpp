@@ -267,14 +267,17 @@ void draw_pairs(RunContext& context, const InferOptions& options, const Inferenc
   }
   write_file(context.output("pairs.dat"), draws + "\n\n" + (best.empty() ? "NaN\n" : best));
   const std::string body = PairPlot(context, options, found.draws.size()).commands();
-  run_gnuplot(context.output_directory(), "pairs",
-              "set encoding utf8\ntic_font = ',14'\nlabel_font = ',15'\nset terminal svg size 700,700 noenhanced font "
-              "'Helvetica,14' background '#ffffff'\nset output 'pairs.svg'\n" +
-                  body +
-                  "reset\ntic_font = ',9'\nlabel_font = ',11'\nset terminal pdfcairo size 17.2cm,17.2cm noenhanced "
-                  "font 'Helvetica,9' background "
-                  "'#ffffff'\nset output 'pairs.pdf'\n" +
-                  body);
+  Drawings drawings(context.output_directory());
+  drawings.add_script(
+      "pairs",
+      "set encoding utf8\ntic_font = ',14'\nlabel_font = ',15'\nset terminal svg size 700,700 noenhanced font "
+      "'Helvetica,14' background '#ffffff'\nset output 'pairs.svg'\n" +
+          body +
+          "reset\ntic_font = ',9'\nlabel_font = ',11'\nset terminal pdfcairo size 17.2cm,17.2cm noenhanced "
+          "font 'Helvetica,9' background "
+          "'#ffffff'\nset output 'pairs.pdf'\n" +
+          body);
+  drawings.draw();
 }
 
 StagePages infer_pages() {

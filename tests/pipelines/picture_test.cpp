@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <regex>
 #include <string>
+#include <vector>
 
 #include "pipelines/formats/errors.hpp"
 #include "pipelines/stages/figure.hpp"
@@ -16,6 +19,13 @@ using namespace shakebed::tests;
 using testing::HasSubstr;
 using testing::Not;
 using Style = Series::Style;
+
+template <typename AnyPicture>
+void drawn(const AnyPicture& picture, const std::filesystem::path& folder, const std::string& name) {
+  Drawings drawings(folder);
+  drawings.add(picture, name);
+  drawings.draw();
+}
 
 // One panel. Filled symbols go round 7, 5, 9, ...; an open one is that of the series before. Numbers above 0 from 2 to
 // 500 lie 250 times apart: below 300 the axis has labels at 1, 2 and 5 times powers of ten, from half the least on.
@@ -33,7 +43,7 @@ TEST(PictureScript, NamesSeriesSymbolsColoursAndAxes) {
   picture.bands = {{1.5, 2.5}, {3, 3.25}};
   picture.band_label = "window";
   picture.logarithmic_y = true;
-  draw_picture(picture, folder.path(), "p");
+  drawn(picture, folder.path(), "p");
   EXPECT_EQ(read_text(folder / "p.dat"),
             "# first_one\n# x y std_error\n1 2 0.5\n2 500 0\n\n\n# open\n# x y\n3 20\n\n\n# second\n# x y\n4 40\n\n\n"
             "# line\n# x y\n1 0\n4 30\n\n\n# T_c\n# x y\n1 3\n4 3\n\n\n# dots\n# x y\n1 4\n4 4\n\n\n");
@@ -78,7 +88,7 @@ TEST(PictureScript, OfTwoPanelsSharesItsAxis) {
   picture.lower = {{"zero", Style::line, 0, {1, 2}, {0, 0}, {}},
                    {"d", Style::points, 0, {1, 2}, {-0.5, 0.25}, {0.2, 0.25}}};
   picture.logarithmic_x = true;
-  draw_picture(picture, folder.path(), "two");
+  drawn(picture, folder.path(), "two");
   const std::string script = read_text(folder / "two.gp");
   EXPECT_THAT(script, HasSubstr("set xrange [*:*]\nset yrange [*:*]\nset logscale x\nset border"))
       << "1000 times apart: labels at the decades alone";
@@ -111,7 +121,7 @@ TEST(PictureScript, HasAsManyColumnsInItsKeyAsItsLabelsAllow) {
     // A letter of two bytes counts as one.
     for (std::size_t k = 0; k < entries; ++k)
       picture.series.push_back({"φ" + std::string(letters - 1, 'a'), Style::line, 0, {0, 1}, {0, 1}, {}});
-    EXPECT_THROW(draw_picture(picture, folder.path(), "p"), StageError) << "without gnuplot; the script is there";
+    EXPECT_THROW(drawn(picture, folder.path(), "p"), StageError) << "without gnuplot; the script is there";
     std::string found;
     const std::string script = read_text(folder / "p.gp");
     for (std::size_t at = 0; (at = script.find("key_rows = ", at)) != std::string::npos; ++at) {
@@ -134,46 +144,84 @@ TEST(PictureScript, HasAsManyColumnsInItsKeyAsItsLabelsAllow) {
 
 // gnuplot leaves out columns of the key that it finds too wide. A label stands in the file as a title and as a text.
 TEST(PictureKey, HasEveryEntry) {
-  for (const std::size_t letters : {27U, 28U, 44U, 45U, 60U}) {
-    const ScratchFolder folder;
+  const ScratchFolder folder;
+  Drawings drawings(folder.path());
+  const std::vector<std::size_t> lengths{27, 28, 44, 45, 60};
+  const auto label = [](std::size_t letters, std::size_t k) {
+    return std::to_string(k) + std::string(letters - 1, k == 2 ? 'e' : 'a');
+  };
+  for (const std::size_t letters : lengths) {
     Picture picture{.x_label = "x", .y_label = "y", .x_low = 0.0, .x_high = 2.0};
-    const auto label = [&](std::size_t k) { return std::to_string(k) + std::string(letters - 1, k == 2 ? 'e' : 'a'); };
-    for (std::size_t k = 0; k < 6; ++k) picture.series.push_back({label(k), Style::line, 0, {0, 1}, {0, 1}, {}});
-    draw_picture(picture, folder.path(), "p");
-    const std::string svg = read_text(folder / "p.svg");
+    for (std::size_t k = 0; k < 6; ++k)
+      picture.series.push_back({label(letters, k), Style::line, 0, {0, 1}, {0, 1}, {}});
+    drawings.add(picture, std::to_string(letters));
+  }
+  drawings.draw();
+  for (const std::size_t letters : lengths) {
+    const std::string svg = read_text(folder / (std::to_string(letters) + ".svg"));
     for (std::size_t k = 0; k < 6; ++k) {
-      const std::size_t title = svg.find(label(k));
+      const std::size_t title = svg.find(label(letters, k));
       ASSERT_NE(title, std::string::npos);
-      EXPECT_NE(svg.find(label(k), title + 1), std::string::npos) << letters << " letters, entry " << k;
+      EXPECT_NE(svg.find(label(letters, k), title + 1), std::string::npos) << letters << " letters, entry " << k;
     }
   }
 }
 
 TEST(PictureScript, NeedsSomethingToDraw) {
   const ScratchFolder folder;
-  EXPECT_THROW(draw_picture({.x_label = "x", .y_label = "y", .series = {{"empty", Style::line, 0, {}, {}, {}}}},
-                            folder.path(), "p"),
+  EXPECT_THROW(drawn(Picture{.x_label = "x", .y_label = "y", .series = {{"empty", Style::line, 0, {}, {}, {}}}},
+                     folder.path(), "p"),
                StageError);
-  EXPECT_THROW(draw_disks({.width = 3}, folder.path(), "d"), StageError);
-  EXPECT_THROW(run_gnuplot(folder.path(), "q", "no such command\n"), StageError);
+  EXPECT_THROW(drawn(DiskPicture{.width = 3}, folder.path(), "d"), StageError);
+}
+
+// Those that one run of gnuplot draws are those drawn alone: the PDF to the byte, the SVG but for the colour of its
+// empty groups, of which the first keeps that of the picture before. A script that cannot be drawn is named.
+TEST(Drawings, AreThoseDrawnAlone) {
+  const ScratchFolder folder;
+  const Picture one{.x_label = "x", .y_label = "y", .series = {{"a", Style::line, 1, {0, 1}, {0, 1}, {}}}, .x_high = 3};
+  const Picture two{.x_label = "u", .y_label = "v", .series = {{"b", Style::points, 2, {1, 9}, {2, 5}, {}}}};
+  Drawings both(folder.path());
+  both.add(one, "one");
+  both.add(two, "two");
+  both.draw();
+  std::filesystem::create_directory(folder / "alone");
+  drawn(one, folder / "alone", "one");
+  drawn(two, folder / "alone", "two");
+  const auto svg = [](const std::filesystem::path& file) {
+    return std::regex_replace(read_text(file), std::regex("(<g [^>]*) stroke=\"[^\"]*\"([^>]*>\n</g>)"), "$1$2");
+  };
+  for (const std::string name : {"one", "two"}) {
+    EXPECT_EQ(read_text(folder / (name + ".pdf")), read_text(folder / ("alone/" + name + ".pdf")));
+    EXPECT_EQ(svg(folder / (name + ".svg")), svg(folder / ("alone/" + name + ".svg")));
+    EXPECT_EQ(read_text(folder / (name + ".gp")), read_text(folder / ("alone/" + name + ".gp")));
+  }
+  both.add_script("bad", "no such command\n");
+  both.add(one, "late");
+  try {
+    both.draw();
+    FAIL() << "a script that is none was drawn";
+  } catch (const StageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("gnuplot could not draw bad.gp (exit code "));
+  }
 }
 
 // Disks to scale: the axis ends above the highest disk, 3.2 + 0.5 + 0.5, at 5. The sheet is (4.2... of the highest rim
 // 3.7 + 8)/(width 6 + 10) = 0.73125 of its width high: 628.9 of 860 pixels, 178.3 of 243.8 points = 6.29 cm.
 TEST(DiskScript, DrawsDisksAndCrosses) {
   const ScratchFolder folder;
-  draw_disks({.width = 6,
-              .x = {1, 2.5},
-              .y = {0.5, 3.2},
-              .radius = {0.5, 0.5},
-              .color = {0.25, 1},
-              .cross_x = {4},
-              .cross_y = {2},
-              .x_label = "x/D",
-              .y_label = "z/D",
-              .color_label = "order",
-              .cross_label = "empty_site"},
-             folder.path(), "d");
+  drawn(DiskPicture{.width = 6,
+                    .x = {1, 2.5},
+                    .y = {0.5, 3.2},
+                    .radius = {0.5, 0.5},
+                    .color = {0.25, 1},
+                    .cross_x = {4},
+                    .cross_y = {2},
+                    .x_label = "x/D",
+                    .y_label = "z/D",
+                    .color_label = "order",
+                    .cross_label = "empty_site"},
+        folder.path(), "d");
   EXPECT_EQ(read_text(folder / "d.dat"),
             "# disks: x y radius color\n1 0.5 0.5 0.25\n2.5 3.2 0.5 1\n\n\n# crosses: x y\n4 2\n\n\n");
   const std::string script = read_text(folder / "d.gp");
@@ -192,15 +240,16 @@ TEST(DiskScript, DrawsDisksAndCrosses) {
 // Cells with two marks, on an axis of decades from 1 to 20.
 TEST(CellScript, DrawsCellsAndMarks) {
   const ScratchFolder folder;
-  draw_cells({.name = "m",
-              .data = "1 1 0.5 1.5 0.5 1.5 3\n20 1 10 30 0.5 1.5 4\n\n\n1 1\n\n\n20 1\n",
-              .x_label = "x",
-              .y_label = "y",
-              .value_label = "T",
-              .value_low = 2.5,
-              .decades_x = std::pair(1.0, 20.0),
-              .marks = {{"a_b", 1}, {"c", 5}}},
-             folder.path());
+  Drawings drawings(folder.path());
+  drawings.add(MapPicture{.name = "m",
+                          .data = "1 1 0.5 1.5 0.5 1.5 3\n20 1 10 30 0.5 1.5 4\n\n\n1 1\n\n\n20 1\n",
+                          .x_label = "x",
+                          .y_label = "y",
+                          .value_label = "T",
+                          .value_low = 2.5,
+                          .decades_x = std::pair(1.0, 20.0),
+                          .marks = {{"a_b", 1}, {"c", 5}}});
+  drawings.draw();
   const std::string script = read_text(folder / "m.gp");
   EXPECT_THAT(script, HasSubstr("set cblabel 'T'\n"));
   EXPECT_THAT(script, HasSubstr("set cbrange [2.5:*]\n"));
