@@ -13,7 +13,7 @@ trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 "$shakebed" schema >schema.json
 "$shakebed" init starter.json >/dev/null
-"$shakebed" run starter.json --out o --preset quick --until bed --quiet >/dev/null
+"$shakebed" run starter.json --out o --preset quick --until bed --quiet --set /stages/bed/replicas=1 >/dev/null
 cat >check.js <<'JS'
 const fs = require("fs"), path = require("path"), Ajv = require("ajv");
 const read = name => JSON.parse(fs.readFileSync(name, "utf8"));
