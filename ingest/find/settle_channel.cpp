@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -46,6 +47,10 @@ constexpr double the_same = 0.998;
 // one.
 constexpr std::size_t most_channels = 2;
 
+// Beads that are so many, so much of all edges and so sure are expected to be found by their faces.
+constexpr std::size_t many = 50;
+constexpr double most_of_the_edges = 0.5, hardly_wrong = 0.02;
+
 enum class Shades { common, all };
 
 struct Trial {
@@ -53,6 +58,7 @@ struct Trial {
   double expected = 0;  // beads found, each by its probability
   bool by_rims = true;
   double wrong = 1, missed = 1;  // shares that are expected, of the disks and of the beads
+  std::shared_ptr<SearchedFrame> searched;
   [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly; }
   // Beads found, less the disks that are none: a wrong disk is as bad as a bead that is missed.
   [[nodiscard]] double worth() const { return expected - wrong * static_cast<double>(disks.size()); }
@@ -66,22 +72,27 @@ bool better_there(const Trial& here, const Trial& there) {
   return !there.by_rims && there.wrong < hardly;
 }
 
-Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<PixelRectangle>& roi, Shades shades) {
-  FindOptions find;
-  find.seen = seen;
-  find.roi = roi;
-  find.rims_of_one_size = true;
-  CalibrationResult learned = learn_beads({&frame}, find);
+Trial trial_of(const CalibrationResult& learned, const FindResult& found) {
   Trial trial;
-  if (!learned.found) return trial;
   trial.by_rims = learned.calibration.by_rims;
-  FindResult found = learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
-  if (shades == Shades::all) learn_other_shade(frame, find, learned.calibration, found);
   for (const FoundDisk& disk : found.disks) trial.expected += disk.probability;
   trial.missed = learned.calibration.expected_missed;
   if (!found.disks.empty()) trial.wrong = 1 - trial.expected / static_cast<double>(found.disks.size());
-  trial.disks = std::move(found.disks);
+  trial.disks = found.disks;
   return trial;
+}
+
+FindResult found_in(const GrayFrame& frame, const CalibrationResult& learned, const FindOptions& find) {
+  return learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
+}
+
+Trial tried(const GrayFrame& frame, FindOptions find, Shades shades) {
+  find.rims_of_one_size = true;
+  CalibrationResult learned = learn_beads({&frame}, find);
+  if (!learned.found) return {};
+  FindResult found = found_in(frame, learned, find);
+  if (shades == Shades::all) learn_other_shade(frame, find, learned.calibration, found);
+  return trial_of(learned, found);
 }
 
 // Median over the disks of the level inside less that around them.
@@ -91,16 +102,18 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
     const double x = (disk.circle.x + 0.5) / scale - 0.5, y = (disk.circle.y + 0.5) / scale - 0.5;
     const double radius = disk.circle.radius / scale;
     const int reach = static_cast<int>(std::ceil(farthest_behind * radius));
+    const double inner = std::pow(inside * radius, 2), outer = std::pow(outside * radius, 2),
+                 farthest = std::pow(farthest_behind * radius, 2);
     double in = 0, in_count = 0, out = 0, out_count = 0;
     for (int row = std::max(0, static_cast<int>(y) - reach);
          row <= std::min(frame.height - 1, static_cast<int>(y) + reach); ++row)
       for (int column = std::max(0, static_cast<int>(x) - reach);
            column <= std::min(frame.width - 1, static_cast<int>(x) + reach); ++column) {
-        const double away = std::hypot(column - x, row - y) / radius;
+        const double away = (column - x) * (column - x) + (row - y) * (row - y);
         const float level = frame.at(column, row);
         if (unseen(level)) continue;
-        if (away < inside) in += static_cast<double>(level), ++in_count;
-        if (away > outside && away < farthest_behind) out += static_cast<double>(level), ++out_count;
+        if (away < inner) in += static_cast<double>(level), ++in_count;
+        if (away > outer && away < farthest) out += static_cast<double>(level), ++out_count;
       }
     if (in_count > 0 && out_count > 0) contrasts.push_back(in / in_count - out / out_count);
   }
@@ -125,7 +138,30 @@ class ChannelTrials {
   }
 
   [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity, Shades shades) const {
-    return tried(small(picture), {polarity, radius_px()}, roi_, shades);
+    FindOptions find;
+    find.seen = BeadsSeen{polarity, radius_px()};
+    find.roi = roi_;
+    return tried(small(picture), find, shades);
+  }
+
+  // In the channel in which the beads were seen: the search itself where it can be. Its disks are those in the part.
+  [[nodiscard]] Trial first_trial(const GrayFrame& picture, const SurveyOptions& options) const {
+    if (!options.search || !searches_all(picture, options))
+      return trial_in(picture, best_.rims.polarity, Shades::common);
+    FindOptions find = *options.search;
+    find.seen = BeadsSeen{best_.rims.polarity, radius_px(), best_.one_sided};
+    if (find.radius_px) *find.radius_px /= frames_.reduction;
+    find.recorded_px = frames_.reduction;
+    FindOptions asked = find;
+    find.rims_of_one_size = true;  // which faces do not depend on
+    CalibrationResult learned = learn_beads({&picture}, find);
+    if (!learned.found) return {};
+    Trial trial = trial_of(learned, found_in(picture, learned, find));
+    keep_to_part(trial);
+    if (!trial.by_rims)
+      trial.searched =
+          std::make_shared<SearchedFrame>(picture, frames_.reduction, std::move(asked), std::move(learned));
+    return trial;
   }
 
   [[nodiscard]] double expected_by_rims(const GrayFrame& picture, Polarity polarity) const {
@@ -174,6 +210,16 @@ class ChannelTrials {
   }
 
  private:
+  // Whether beads will be searched in frames like this one, as the trial would search its part. In a frame that is
+  // larger than the part this is worth its time if they are expected to be found by their faces.
+  [[nodiscard]] bool searches_all(const GrayFrame& picture, const SurveyOptions& options) const {
+    if (factor_ > 1 || options.roi || best_.region || picture.enlargement > 1) return false;
+    if (frames_.reduction > 1 && radius_px() < trial_radius_px) return false;
+    const bool plain = best_.disks.size() >= many && best_.explained_share >= most_of_the_edges &&
+                       best_.expected_wrong <= hardly_wrong;
+    return plain || (part_.width == picture.width && part_.height == picture.height);
+  }
+
   // The same part of every channel, so that numbers of beads compare.
   [[nodiscard]] GrayFrame small(const GrayFrame& picture) const {
     GrayFrame part = cut_out(factor_ > 1 ? reduced(picture, factor_) : picture, part_);
@@ -181,6 +227,19 @@ class ChannelTrials {
     return part;
   }
   [[nodiscard]] double radius_px() const { return best_.rims.radius_px / (frames_.reduction * factor_); }
+
+  // Of disks in all of the frame.
+  void keep_to_part(Trial& trial) const {
+    std::vector<FoundDisk> all = std::move(trial.disks);
+    trial.disks.clear(), trial.expected = 0;
+    for (FoundDisk& disk : all) {
+      disk.x_px -= part_.left, disk.y_px -= part_.top;
+      if (disk.x_px < -0.5 || disk.y_px < -0.5 || disk.x_px >= part_.width - 0.5 || disk.y_px >= part_.height - 0.5)
+        continue;
+      trial.expected += disk.probability;
+      trial.disks.push_back(disk);
+    }
+  }
 
   const ChannelFrames& frames_;
   const SurveyCandidate& best_;
@@ -224,15 +283,26 @@ std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, cons
 
 }  // namespace
 
+SearchedFrame::SearchedFrame(GrayFrame frame, int reduction, FindOptions options, CalibrationResult learned)
+    : frame_(std::move(frame)), reduction_(reduction), options_(std::move(options)), learned_(std::move(learned)) {}
+
+std::optional<CalibrationResult> SearchedFrame::take(const GrayFrame& frame, const FindOptions& options) {
+  const bool same = frame.width == frame_.width && options == options_ && frame.pixels == frame_.pixels;
+  frame_ = {};
+  std::optional<CalibrationResult> learned = std::exchange(learned_, std::nullopt);
+  return same ? std::move(learned) : std::nullopt;
+}
+
 SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options) {
   const ChannelTrials trials(frames, best, options);
   const auto first = std::find_if(frames.channels.begin(), frames.channels.end(),
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
   const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
   if ((frames.channels.size() < 2 && !large) || first == frames.channels.end()) return best;
-  Trial most = trials.trial_in(first->frame, best.rims.polarity, Shades::common);
+  Trial most = trials.first_trial(first->frame, options);
   SurveyCandidate settled = best;
   settled.by_rims = most.by_rims;
+  settled.searched = most.searched;
   const bool plain = !most.by_rims && !most.doubtful();
   for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
@@ -243,6 +313,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;
     settled.by_rims = there.by_rims;
+    settled.searched.reset();
     most = std::move(there);
   }
   return settled;

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "ingest/find/learn_beads.hpp"
 #include "ingest/find/settle_channel.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/by_hand.hpp"
@@ -119,6 +120,74 @@ GrayFrame rings_of(const std::vector<RenderedDisk>& disks) {
   std::vector<RenderedDisk> inside = disks;
   for (RenderedDisk& disk : inside) disk.radius_px -= 2;
   return sum_of(test::beads_of_level(disks, 70), test::beads_of_level(inside, 230));
+}
+
+// What a search of the frame finds is taken once, by whoever searches the same levels with the same options.
+TEST(ChannelTrials, KeepASearchOfAllTheFrame) {
+  const std::vector<RenderedDisk> all = beads_of_trial();
+  const TrialFrames frames(all, {all.begin(), all.end() - 3}, 230);
+  EXPECT_EQ(frames.settled().searched, nullptr);
+  SurveyOptions asked;
+  asked.search.emplace();
+  const GrayFrame& red = frames.frames.channels.front().frame;
+  FindOptions find;
+  find.seen = BeadsSeen{Polarity::dark_beads, 9};
+  const CalibrationResult known = learn_beads({&red}, find);
+  const auto learned = [&](const GrayFrame& frame, const FindOptions& options) {
+    const SurveyCandidate settled = frames.settled(asked);
+    const auto first = settled.searched->take(frame, options);
+    EXPECT_FALSE(settled.searched->take(red, find)) << "only once";
+    return first;
+  };
+  const auto kept = learned(red, find);
+  ASSERT_TRUE(kept && kept->in_last_frame && known.in_last_frame);
+  EXPECT_EQ(kept->calibration.radius_px, known.calibration.radius_px);
+  EXPECT_EQ(kept->in_last_frame->disks.size(), 20U);
+  GrayFrame other = red;
+  other.pixels.back() += 1;
+  EXPECT_FALSE(learned(other, find));
+  find.one_size = true;
+  EXPECT_FALSE(learned(red, find));
+}
+
+// Of a candidate's frames, reduced by two, and of the region or the frames' other channel nothing is kept.
+TEST(ChannelTrials, KeepNoSearchThatIsNotTheOneToCome) {
+  const std::vector<RenderedDisk> all = beads_of_trial(), fewer(all.begin(), all.end() - 3);
+  SurveyOptions asked;
+  asked.search.emplace();
+  EXPECT_EQ(TrialFrames(fewer, all, 230).settled(asked).searched, nullptr) << "another channel";
+  const auto reduced = TrialFrames(all, fewer, 230, 2).settled(asked).searched;
+  ASSERT_NE(reduced, nullptr);
+  EXPECT_EQ(reduced->reduction(), 2);
+  TrialFrames small(all, fewer, 230, 2);
+  small.best.rims.radius_px = 17;
+  EXPECT_EQ(small.settled(asked).searched, nullptr) << "too small to be searched in a reduced frame";
+  asked.roi = PixelRectangle{0, 0, 150, 122};
+  EXPECT_EQ(TrialFrames(all, fewer, 230).settled(asked).searched, nullptr);
+}
+
+// Two rows of beads, wider than the part that channels are compared in. Red misses four of those in the part.
+TEST(ChannelTrials, CountOfASearchInAllTheFrameTheBeadsOfThePart) {
+  std::vector<RenderedDisk> all, in_red;
+  for (int k = 0; k < 64; ++k) all.push_back({16 + 28.0 * (k / 2), 16 + 28.0 * (k % 2), 9, 0, 0});
+  for (int k = 0; k < 64; ++k)
+    if (k < 28 || k >= 32) in_red.push_back(all[static_cast<std::size_t>(k)]);
+  TrialFrames wide(in_red, {}, 230);
+  const auto drawn = [](const std::vector<RenderedDisk>& disks, double level) {
+    return render_frame(
+        disks,
+        {.width = 900, .height = 60, .background_level = 150, .bead_level = level, .blur_px = 0.8, .read_noise = 2});
+  };
+  wide.frames.width = 900, wide.frames.height = 60;
+  wide.frames.channels[0].frame = drawn(in_red, 70), wide.frames.channels[1].frame = drawn(all, 230);
+  wide.best.explained_share = 0.9;
+  SurveyOptions asked;
+  asked.search.emplace();
+  EXPECT_EQ(wide.settled(asked).channel, Channel::green);
+  wide.frames.channels[1].frame = drawn(in_red, 230);
+  EXPECT_NE(wide.settled(asked).searched, nullptr);
+  wide.best.explained_share = 0.4;
+  EXPECT_EQ(wide.settled(asked).searched, nullptr) << "they may have to be found by their rims";
 }
 
 // Blue shows one bead more than green does, but by its rim alone.
