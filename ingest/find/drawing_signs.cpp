@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 namespace shakebed::ingest {
@@ -9,7 +10,7 @@ namespace shakebed::ingest {
 namespace {
 
 constexpr float faint_step = 4;                            // grey levels: up to it noise, beyond it an edge
-constexpr std::size_t shortest_run = 12;                   // px of one level on both sides of an edge
+constexpr std::uint32_t shortest_run = 12;                 // px of one level on both sides of an edge
 constexpr float darkest_level = 3, brightest_level = 252;  // grey levels: beyond, a camera may be at its limits ...
 constexpr double least_shaded = 0.005;                     // ... and so much of the picture must be between
 constexpr double ruled_share = 0.25;                       // of the frame's width or height
@@ -28,16 +29,12 @@ constexpr double share_of_beads = 0.5;
 class RuledEdges {
  public:
   RuledEdges(std::size_t lines, std::size_t length) : run_(lines, 0), total_(lines, 0), length_(length) {}
-  void take(std::size_t line, bool goes_on) {
-    if (!goes_on) {
-      run_[line] = 0;
-      return;
-    }
-    ++run_[line];
-    if (run_[line] == shortest_run)
-      total_[line] += shortest_run;
-    else if (run_[line] > shortest_run)
-      ++total_[line];
+  // Whether the edges go on, of one line a time ...
+  void take(std::size_t line, bool goes_on) { take(goes_on, run_[line], total_[line]); }
+  // ... or of all lines, one by one in `goes_on`: 1 or 0.
+  void take(const std::vector<std::uint32_t>& goes_on) {
+    std::uint32_t *run = run_.data(), *total = total_.data();
+    for (std::size_t line = 0; line < run_.size(); ++line) take(goes_on[line], run[line], total[line]);
   }
   [[nodiscard]] std::size_t count() const {
     std::size_t lines = 0, last = 0;
@@ -50,7 +47,12 @@ class RuledEdges {
   }
 
  private:
-  std::vector<std::size_t> run_, total_;
+  static void take(std::uint32_t goes_on, std::uint32_t& run, std::uint32_t& total) {
+    run = (run + 1) * goes_on;
+    total += run == shortest_run ? shortest_run : run > shortest_run ? 1 : 0;
+  }
+
+  std::vector<std::uint32_t> run_, total_;
   std::size_t length_;
 };
 
@@ -70,27 +72,37 @@ DrawingSigns signs_of_drawing(const GrayFrame& frame) {
   RuledEdges rows(height - 1, width), columns(width - 1, height);
   std::size_t flat = 0, shaded_flat = 0, faint = 0;
   std::vector<float> lowest(width), highest(width);  // of three rows
+  std::vector<std::uint32_t> goes_on(width - 1);
   for (std::size_t row = 1; row < height; ++row) {
     const float* above = frame.pixels.data() + (row - 1) * width;
     const float* here = above + width;
     const float* below = row + 1 < height ? here + width : here;
+    std::uint32_t any = 0;  // edges between this row and the one above
+    for (std::size_t k = 1; k < width; ++k) {
+      const bool same_above = above[k] == above[k - 1], same_here = here[k] == here[k - 1];
+      goes_on[k - 1] = same_above & same_here & (std::abs(here[k] - above[k]) >= faint_step);
+      any |= goes_on[k - 1];
+    }
+    for (std::size_t k = 0; any != 0 && k < goes_on.size(); ++k) rows.take(row - 1, goes_on[k] != 0);
+    for (std::size_t k = 1; k < width; ++k)
+      goes_on[k - 1] =
+          (above[k] == here[k]) & (above[k - 1] == here[k - 1]) & (std::abs(here[k] - here[k - 1]) >= faint_step);
+    columns.take(goes_on);
+    if (row + 1 == height) break;
     for (std::size_t k = 0; k < width; ++k) {
       lowest[k] = std::min(std::min(above[k], here[k]), below[k]);
       highest[k] = std::max(std::max(above[k], here[k]), below[k]);
     }
-    for (std::size_t k = 1; k < width; ++k) {
-      const bool same_above = above[k] == above[k - 1], same_here = here[k] == here[k - 1];
-      rows.take(row - 1, same_above && same_here && std::abs(here[k] - above[k]) >= faint_step);
-      columns.take(k - 1,
-                   above[k] == here[k] && above[k - 1] == here[k - 1] && std::abs(here[k] - here[k - 1]) >= faint_step);
-      if (row + 1 == height || k + 1 == width) continue;
+    std::uint32_t flat_here = 0, shaded_here = 0, faint_here = 0;
+    for (std::size_t k = 1; k + 1 < width; ++k) {
       const float low = std::min(std::min(lowest[k - 1], lowest[k]), lowest[k + 1]);
       const float high = std::max(std::max(highest[k - 1], highest[k]), highest[k + 1]);
-      flat += high == low;
-      if (here[k] < darkest_level || here[k] > brightest_level) continue;
-      shaded_flat += high == low;
-      faint += high > low && high - low <= faint_step;
+      const bool shaded = (here[k] >= darkest_level) & (here[k] <= brightest_level);
+      flat_here += high == low;
+      shaded_here += shaded & (high == low);
+      faint_here += shaded & (high > low) & (high - low <= faint_step);
     }
+    flat += flat_here, shaded_flat += shaded_here, faint += faint_here;
   }
   const auto inner = static_cast<double>((width - 2) * (height - 2));
   signs.flat_share = static_cast<double>(flat) / inner;

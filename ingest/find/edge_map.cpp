@@ -144,24 +144,47 @@ int next_steep(const std::vector<std::uint8_t>& steep, int column) {
   return found == nullptr ? size : static_cast<int>(static_cast<const std::uint8_t*>(found) - steep.data());
 }
 
+// Squares of the gradients' sizes, of the three rows about one.
+class SquaresOfThreeRows {
+ public:
+  explicit SquaresOfThreeRows(const EdgeMap& edges) : edges_(edges) {
+    for (std::vector<float>& row : rows_) row.resize(static_cast<std::size_t>(edges.width));
+    fill(0), fill(1);
+  }
+  // Rows from 1 on, one after the other.
+  void go_to(int row) { fill(row + 1); }
+  [[nodiscard]] const float* row(int row) const { return rows_[static_cast<std::size_t>(row % 3)].data(); }
+
+ private:
+  void fill(int row) {
+    const float *x = edges_.x.data() + edges_.at(0, row), *y = edges_.y.data() + edges_.at(0, row);
+    std::vector<float>& to = rows_[static_cast<std::size_t>(row % 3)];
+    for (std::size_t k = 0; k < to.size(); ++k) to[k] = x[k] * x[k] + y[k] * y[k];
+  }
+
+  const EdgeMap& edges_;
+  std::array<std::vector<float>, 3> rows_;
+};
+
 // Pixels whose gradient is larger than that of both neighbours along it.
 void thin(EdgeMap& edges) {
   const int width = edges.width;
   const float least = edges.threshold * edges.threshold;
-  const auto square = [&](std::size_t at) { return edges.x[at] * edges.x[at] + edges.y[at] * edges.y[at]; };
+  SquaresOfThreeRows squares(edges);
   std::vector<std::uint8_t> steep(static_cast<std::size_t>(width));
   for (int row = 1; row + 1 < edges.height; ++row) {
-    const std::size_t first = edges.at(0, row);
-    for (std::size_t k = 0; k < steep.size(); ++k) steep[k] = square(first + k) >= least ? 1 : 0;
+    squares.go_to(row);
+    const std::array<const float*, 3> beside = {squares.row(row - 1), squares.row(row), squares.row(row + 1)};
+    const float *square = beside[1], *to_x = edges.x.data() + edges.at(0, row),
+                *to_y = edges.y.data() + edges.at(0, row);
+    for (std::size_t k = 0; k < steep.size(); ++k) steep[k] = square[k] >= least ? 1 : 0;
     for (int column = next_steep(steep, 1); column + 1 < width; column = next_steep(steep, column + 1)) {
-      const std::size_t at = edges.at(column, row);
-      const float here = square(at);
-      const float x = edges.x[at], y = edges.y[at];
+      const float here = square[column], x = to_x[column], y = to_y[column];
       constexpr float diagonal = 0.4142F;  // tan 22.5 degrees
       const int step_x = std::abs(x) < diagonal * std::abs(y) ? 0 : x > 0 ? 1 : -1;
       const int step_y = std::abs(y) < diagonal * std::abs(x) ? 0 : y > 0 ? 1 : -1;
-      if (square(edges.at(column + step_x, row + step_y)) > here) continue;
-      if (square(edges.at(column - step_x, row - step_y)) >= here) continue;
+      if (beside[static_cast<std::size_t>(1 + step_y)][column + step_x] > here) continue;
+      if (beside[static_cast<std::size_t>(1 - step_y)][column - step_x] >= here) continue;
       const float size = std::sqrt(here);
       edges.ridge.push_back({static_cast<float>(column), static_cast<float>(row), x / size, y / size});
     }

@@ -40,6 +40,7 @@ struct BeadsSeen {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   bool one_sided = false;  // one side of the rim is hardly seen: the radius is that of a part of the bead
+  bool operator==(const BeadsSeen&) const = default;
 };
 
 // Everything is found when left alone; each member overrides one finding.
@@ -65,6 +66,7 @@ struct FindOptions {
 
   // Why nothing can be found with these options, one sentence each; empty when it can.
   [[nodiscard]] std::vector<std::string> validate() const;
+  bool operator==(const FindOptions&) const = default;
 };
 
 // What is common to all frames of a film, learned from its first frames.

@@ -96,7 +96,7 @@ class RimWalk {
              lower * ((1 - right) * static_cast<double>(field[below]) + right * static_cast<double>(field[below + 1]));
     };
     const double along_x = mix(edges_.x), along_y = mix(edges_.y);
-    return {along_x * ray.cosine + along_y * ray.sine, std::hypot(along_x, along_y)};
+    return {along_x * ray.cosine + along_y * ray.sine, std::sqrt(along_x * along_x + along_y * along_y)};
   }
 
   // Of the step outwards, where either is looked for.
@@ -109,7 +109,8 @@ class RimWalk {
 
   [[nodiscard]] bool beside_another(double x, double y) const {
     return std::any_of(near_.begin(), near_.end(), [&](const Circle& other) {
-      return std::hypot(x - other.x, y - other.y) < other.radius + merged_px * frame_px_;
+      const double dx = x - other.x, dy = y - other.y, reach = other.radius + merged_px * frame_px_;
+      return dx * dx + dy * dy < reach * reach;
     });
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -39,49 +40,70 @@ constexpr double hardly = 0.05;
 // the centres of disks in radii. A bead may have no contrast in one channel, as a dark one in the saturation.
 constexpr double sure_rim = 0.9, nearest_of_another = 1.6;
 
+// Of a radius: beads that are plainly seen here, and are of another radius there, are not the same.
+constexpr double another_size = 0.12;
+
 // Two channels of which one tells this share of the other's variance show the same beads.
 constexpr double the_same = 0.998;
+
+// Rims of the sign that most beads have not; fewer say nothing about a channel.
+constexpr double fewest_of_other_sign = 3;
 
 // Of the other channels, those in which a quick search by rims expects most beads are searched as thoroughly as this
 // one.
 constexpr std::size_t most_channels = 2;
 
-enum class Shades { common, all };
+// Beads that are so many, so much of all edges and so sure are expected to be found by their faces.
+constexpr std::size_t many = 50;
+constexpr double most_of_the_edges = 0.5, hardly_wrong = 0.02;
+
+// Whether beads of another shade count, which a run finds, too: this takes a tenth of a trial's time or more.
+enum class Shades { common, where_doubtful, all };
 
 struct Trial {
   std::vector<FoundDisk> disks;
-  double expected = 0;  // beads found, each by its probability
+  double radius_px = 0, expected = 0;  // beads found, each by its probability
   bool by_rims = true;
   double wrong = 1, missed = 1;  // shares that are expected, of the disks and of the beads
+  std::shared_ptr<SearchedFrame> searched;
   [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly; }
+  [[nodiscard]] bool plain() const { return !by_rims && !doubtful(); }
   // Beads found, less the disks that are none: a wrong disk is as bad as a bead that is missed.
   [[nodiscard]] double worth() const { return expected - wrong * static_cast<double>(disks.size()); }
 };
 
 // Whether a channel in which more beads are expected shows them so well that this one is left for it.
 bool better_there(const Trial& here, const Trial& there) {
-  if (here.by_rims || here.doubtful())
-    return there.worth() > (there.by_rims && !here.by_rims ? far_more : clearly_more) * here.worth();
-  // More faces are found where other things pass as beads, too: these then are less sure.
-  return !there.by_rims && there.wrong < hardly;
+  if (there.worth() <= (there.by_rims && !here.by_rims ? far_more : clearly_more) * here.worth()) return false;
+  if (!here.plain()) return true;
+  // More disks are found where other things pass as beads, too: these then are less sure. And rims of one sign may be
+  // those of the bright middle of some beads.
+  return there.wrong < hardly && std::abs(there.radius_px / here.radius_px - 1) < another_size;
 }
 
-Trial tried(const GrayFrame& frame, const BeadsSeen& seen, const std::optional<PixelRectangle>& roi, Shades shades) {
-  FindOptions find;
-  find.seen = seen;
-  find.roi = roi;
-  find.rims_of_one_size = true;
-  CalibrationResult learned = learn_beads({&frame}, find);
+Trial trial_of(const FinderCalibration& learned, const FindResult& found) {
   Trial trial;
-  if (!learned.found) return trial;
-  trial.by_rims = learned.calibration.by_rims;
-  FindResult found = learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
-  if (shades == Shades::all) learn_other_shade(frame, find, learned.calibration, found);
+  trial.by_rims = learned.by_rims;
+  trial.radius_px = learned.radius_px;
   for (const FoundDisk& disk : found.disks) trial.expected += disk.probability;
-  trial.missed = learned.calibration.expected_missed;
+  trial.missed = learned.expected_missed;
   if (!found.disks.empty()) trial.wrong = 1 - trial.expected / static_cast<double>(found.disks.size());
-  trial.disks = std::move(found.disks);
+  trial.disks = found.disks;
   return trial;
+}
+
+Trial tried(const GrayFrame& frame, const FindOptions& find, const CalibrationResult& learned, Shades shades) {
+  if (!learned.found) return {};
+  FindResult found = learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
+  Trial trial = trial_of(learned.calibration, found);
+  if (shades == Shades::common || (shades == Shades::where_doubtful && trial.plain())) return trial;
+  FinderCalibration of_both = learned.calibration;
+  learn_other_shade(frame, find, of_both, found);
+  return trial_of(of_both, found);
+}
+
+Polarity opposite(Polarity polarity) {
+  return polarity == Polarity::dark_beads ? Polarity::bright_beads : Polarity::dark_beads;
 }
 
 // Median over the disks of the level inside less that around them.
@@ -91,16 +113,18 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
     const double x = (disk.circle.x + 0.5) / scale - 0.5, y = (disk.circle.y + 0.5) / scale - 0.5;
     const double radius = disk.circle.radius / scale;
     const int reach = static_cast<int>(std::ceil(farthest_behind * radius));
+    const double inner = std::pow(inside * radius, 2), outer = std::pow(outside * radius, 2),
+                 farthest = std::pow(farthest_behind * radius, 2);
     double in = 0, in_count = 0, out = 0, out_count = 0;
     for (int row = std::max(0, static_cast<int>(y) - reach);
          row <= std::min(frame.height - 1, static_cast<int>(y) + reach); ++row)
       for (int column = std::max(0, static_cast<int>(x) - reach);
            column <= std::min(frame.width - 1, static_cast<int>(x) + reach); ++column) {
-        const double away = std::hypot(column - x, row - y) / radius;
+        const double away = (column - x) * (column - x) + (row - y) * (row - y);
         const float level = frame.at(column, row);
         if (unseen(level)) continue;
-        if (away < inside) in += static_cast<double>(level), ++in_count;
-        if (away > outside && away < farthest_behind) out += static_cast<double>(level), ++out_count;
+        if (away < inner) in += static_cast<double>(level), ++in_count;
+        if (away > outer && away < farthest) out += static_cast<double>(level), ++out_count;
       }
     if (in_count > 0 && out_count > 0) contrasts.push_back(in / in_count - out / out_count);
   }
@@ -125,26 +149,57 @@ class ChannelTrials {
   }
 
   [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity, Shades shades) const {
-    return tried(small(picture), {polarity, radius_px()}, roi_, shades);
+    FindOptions find;
+    find.seen = BeadsSeen{polarity, radius_px()};
+    find.roi = roi_;
+    find.rims_of_one_size = true;
+    const GrayFrame part = small(picture);
+    return tried(part, find, learn_beads({&part}, find), shades);
   }
 
-  [[nodiscard]] double expected_by_rims(const GrayFrame& picture, Polarity polarity) const {
+  // In the channel in which the beads were seen: the search itself where it can be. Its disks are those in the part.
+  [[nodiscard]] Trial first_trial(const GrayFrame& picture, const SurveyOptions& options) const {
+    // Of a single channel it is only asked whether its faces are alike.
+    const Shades shades = frames_.channels.size() > 1 ? Shades::where_doubtful : Shades::common;
+    if (!options.search || !searches_all(picture, options)) return trial_in(picture, best_.rims.polarity, shades);
+    FindOptions find = *options.search;
+    find.seen = BeadsSeen{best_.rims.polarity, radius_px(), best_.one_sided};
+    if (find.radius_px) *find.radius_px /= frames_.reduction;
+    find.recorded_px = frames_.reduction;
+    FindOptions asked = find;
+    find.rims_of_one_size = true;  // which faces do not depend on
+    CalibrationResult learned = learn_beads({&picture}, find);
+    Trial trial = tried(picture, find, learned, shades);
+    keep_to_part(trial);
+    if (learned.found && !learned.calibration.by_rims)
+      trial.searched =
+          std::make_shared<SearchedFrame>(picture, frames_.reduction, std::move(asked), std::move(learned));
+    return trial;
+  }
+
+  // What a quick search by rims finds.
+  [[nodiscard]] Trial found_by_rims(const GrayFrame& picture, Polarity polarity) const {
     FindOptions find;
     find.seen = BeadsSeen{polarity, radius_px()};
     find.roi = roi_;
     find.quick_rims_only = true;
     const GrayFrame part = small(picture);
     const CalibrationResult learned = learn_beads({&part}, find);
-    double expected = 0;
-    if (learned.found && learned.in_last_frame)
-      for (const FoundDisk& disk : learned.in_last_frame->disks) expected += disk.probability;
-    return expected;
+    return learned.found && learned.in_last_frame ? trial_of(learned.calibration, *learned.in_last_frame) : Trial{};
   }
 
-  // Whether this channel shows more than `wanted` sure rims, none of which lies on a disk found. Where it has no more
-  // circles than that, they need not be judged.
-  [[nodiscard]] bool shows_more_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture, Polarity polarity,
-                                       double wanted) const {
+  // The other polarity, if its rims have the radius of the beads found more nearly and are no fewer than half of those
+  // of this one. Of beads brighter and darker than the background each sign shows a part.
+  [[nodiscard]] Polarity polarity_of_radius(const GrayFrame& picture, Polarity polarity, double radius) const {
+    const Trial by_this = found_by_rims(picture, polarity), by_other = found_by_rims(picture, opposite(polarity));
+    const auto off = [&](const Trial& trial) { return std::abs(std::log(trial.radius_px / radius)); };
+    return 2 * by_other.expected > by_this.expected && off(by_other) < off(by_this) ? opposite(polarity) : polarity;
+  }
+
+  // Sure rims of this polarity, or of both, that lie on no disk found. Where there are no more circles than are wanted,
+  // these are not judged: 0.
+  [[nodiscard]] double rims_beside(const std::vector<FoundDisk>& disks, const GrayFrame& picture, Polarity polarity,
+                                   double wanted) const {
     const GrayFrame part = small(picture);
     PictureMaps maps(part, quick_search.wanted_px);
     const auto beside = [&](const Circle& circle) {
@@ -153,11 +208,14 @@ class ChannelTrials {
       });
     };
     const std::vector<Circle> circles = circles_seen(maps, polarity, radius_px());
-    if (static_cast<double>(std::count_if(circles.begin(), circles.end(), beside)) <= wanted) return false;
+    if (static_cast<double>(std::count_if(circles.begin(), circles.end(), beside)) <= wanted) return 0;
     double sure = 0;
-    for (const RimDisk& rim : learn_rims(maps, polarity, radius_px(), Known::beads).disks)
-      sure += rim.probability >= sure_rim && beside(rim.circle);
-    return sure > wanted;
+    for (const Polarity sign : {Polarity::dark_beads, Polarity::bright_beads}) {
+      if (polarity != Polarity::automatic && polarity != sign) continue;
+      for (const RimDisk& rim : learn_rims(maps, sign, radius_px(), Known::beads).disks)
+        sure += rim.probability >= sure_rim && beside(rim.circle);
+    }
+    return sure;
   }
 
   // Of the beads in this channel; none where they hardly stand out.
@@ -174,6 +232,16 @@ class ChannelTrials {
   }
 
  private:
+  // Whether beads will be searched in frames like this one, as the trial would search its part. In a frame that is
+  // larger than the part this is worth its time if they are expected to be found by their faces.
+  [[nodiscard]] bool searches_all(const GrayFrame& picture, const SurveyOptions& options) const {
+    if (factor_ > 1 || options.roi || best_.region || picture.enlargement > 1) return false;
+    if (frames_.reduction > 1 && radius_px() < trial_radius_px) return false;
+    const bool plain = best_.disks.size() >= many && best_.explained_share >= most_of_the_edges &&
+                       best_.expected_wrong <= hardly_wrong;
+    return plain || (part_.width == picture.width && part_.height == picture.height);
+  }
+
   // The same part of every channel, so that numbers of beads compare.
   [[nodiscard]] GrayFrame small(const GrayFrame& picture) const {
     GrayFrame part = cut_out(factor_ > 1 ? reduced(picture, factor_) : picture, part_);
@@ -181,6 +249,19 @@ class ChannelTrials {
     return part;
   }
   [[nodiscard]] double radius_px() const { return best_.rims.radius_px / (frames_.reduction * factor_); }
+
+  // Of disks in all of the frame.
+  void keep_to_part(Trial& trial) const {
+    std::vector<FoundDisk> all = std::move(trial.disks);
+    trial.disks.clear(), trial.expected = 0;
+    for (FoundDisk& disk : all) {
+      disk.x_px -= part_.left, disk.y_px -= part_.top;
+      if (disk.x_px < -0.5 || disk.y_px < -0.5 || disk.x_px >= part_.width - 0.5 || disk.y_px >= part_.height - 0.5)
+        continue;
+      trial.expected += disk.probability;
+      trial.disks.push_back(disk);
+    }
+  }
 
   const ChannelFrames& frames_;
   const SurveyCandidate& best_;
@@ -194,10 +275,31 @@ struct OtherChannel {
   Channel channel = Channel::automatic;
   const GrayFrame* frame = nullptr;
   Polarity polarity = Polarity::automatic;
-  double by_rims = 0;  // beads that a quick search expects
+  // Beads that a quick search by rims expects: of this polarity, and of the other, too.
+  double by_rims = 0, of_both_signs = 0;
 };
 
-// In their order in the picture. Where this channel shows the beads plainly, a look at the rims excludes the others.
+// Those in which most beads of one sign are expected by their rims, and the one in which clearly more are expected that
+// have both signs.
+void keep_most_telling(std::vector<OtherChannel>& others) {
+  std::vector<double> ranked;
+  for (const OtherChannel& other : others) ranked.push_back(other.by_rims);
+  std::sort(ranked.begin(), ranked.end(), std::greater<>());
+  std::size_t kept = 0;
+  double most = 0;
+  const auto first_left = std::stable_partition(others.begin(), others.end(), [&](const OtherChannel& other) {
+    return other.by_rims >= ranked[most_channels - 1] && ++kept <= most_channels;
+  });
+  for (auto one = others.begin(); one != first_left; ++one) most = std::max(most, one->of_both_signs);
+  const auto of_both = std::max_element(first_left, others.end(), [](const auto& one, const auto& another) {
+    return one.of_both_signs < another.of_both_signs;
+  });
+  const bool worth_it = of_both->of_both_signs > clearly_more * most;
+  if (worth_it) std::iter_swap(first_left, of_both);
+  others.erase(first_left + (worth_it ? 1 : 0), others.end());
+}
+
+// Where this channel shows the beads plainly, a look at the rims excludes the others.
 std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, const SurveyCandidate& best,
                                                const SurveyOptions& options, const ChannelTrials& trials,
                                                bool here_is_plain) {
@@ -206,23 +308,31 @@ std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, cons
     if (one.channel == best.channel) continue;
     const std::optional<Polarity> polarity = trials.polarity_in(one);
     if (!polarity || (options.polarity != Polarity::automatic && options.polarity != *polarity)) continue;
-    others.push_back({one.channel, &one.frame, *polarity, 0});
+    others.push_back({one.channel, &one.frame, *polarity});
   }
   if (here_is_plain || others.size() <= most_channels) return others;
-  std::vector<double> ranked;
   for (OtherChannel& other : others) {
-    other.by_rims = trials.expected_by_rims(*other.frame, other.polarity);
-    ranked.push_back(other.by_rims);
+    const Trial rims = trials.found_by_rims(*other.frame, other.polarity);
+    other.by_rims = other.of_both_signs = rims.expected;
+    if (options.polarity == Polarity::automatic)
+      other.of_both_signs +=
+          trials.rims_beside(rims.disks, *other.frame, opposite(other.polarity), fewest_of_other_sign);
   }
-  std::sort(ranked.begin(), ranked.end(), std::greater<>());
-  std::size_t kept = 0;
-  std::erase_if(others, [&](const OtherChannel& other) {
-    return other.by_rims < ranked[most_channels - 1] || ++kept > most_channels;
-  });
+  keep_most_telling(others);
   return others;
 }
 
 }  // namespace
+
+SearchedFrame::SearchedFrame(GrayFrame frame, int reduction, FindOptions options, CalibrationResult learned)
+    : frame_(std::move(frame)), reduction_(reduction), options_(std::move(options)), learned_(std::move(learned)) {}
+
+std::optional<CalibrationResult> SearchedFrame::take(const GrayFrame& frame, const FindOptions& options) {
+  const bool same = frame.width == frame_.width && options == options_ && frame.pixels == frame_.pixels;
+  frame_ = {};
+  std::optional<CalibrationResult> learned = std::exchange(learned_, std::nullopt);
+  return same ? std::move(learned) : std::nullopt;
+}
 
 SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options) {
   const ChannelTrials trials(frames, best, options);
@@ -230,19 +340,23 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
   const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
   if ((frames.channels.size() < 2 && !large) || first == frames.channels.end()) return best;
-  Trial most = trials.trial_in(first->frame, best.rims.polarity, Shades::common);
+  Trial most = trials.first_trial(first->frame, options);
   SurveyCandidate settled = best;
   settled.by_rims = most.by_rims;
-  const bool plain = !most.by_rims && !most.doubtful();
-  for (const OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
+  settled.searched = most.searched;
+  const bool plain = most.plain();
+  for (OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
-    const double wanted = clearly_more * most.expected;
-    if (plain && !trials.shows_more_beside(most.disks, *other.frame, other.polarity, wanted - most.expected)) continue;
-    Trial there = trials.trial_in(*other.frame, other.polarity, plain ? Shades::all : Shades::common);
+    const double wanted = clearly_more * most.expected, missing = wanted - most.expected;
+    if (plain && trials.rims_beside(most.disks, *other.frame, options.polarity, missing) <= missing) continue;
+    if (plain && options.polarity == Polarity::automatic)
+      other.polarity = trials.polarity_of_radius(*other.frame, other.polarity, most.radius_px);
+    Trial there = trials.trial_in(*other.frame, other.polarity, Shades::all);
     if (there.expected <= wanted || !better_there(most, there)) continue;
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;
     settled.by_rims = there.by_rims;
+    settled.searched.reset();
     most = std::move(there);
   }
   return settled;

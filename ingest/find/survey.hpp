@@ -3,14 +3,33 @@
 //
 // Any number of threads may call; values own what they hold.
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "ingest/find/find_disks.hpp"
 #include "ingest/find/rim_finder.hpp"
 #include "ingest/frames/frames.hpp"
 
 namespace shakebed::ingest {
+
+// What was learned of a frame, for whoever searches the same frame in the same way.
+class SearchedFrame {
+ public:
+  // `reduction`: of the frame.
+  SearchedFrame(GrayFrame frame, int reduction, FindOptions options, CalibrationResult learned);
+  [[nodiscard]] int reduction() const { return reduction_; }
+  // What learn_beads() would find in this frame with these options; nothing where either differs. It can be asked for
+  // once, and is released then.
+  std::optional<CalibrationResult> take(const GrayFrame& frame, const FindOptions& options);
+
+ private:
+  GrayFrame frame_;
+  int reduction_ = 1;
+  FindOptions options_;
+  std::optional<CalibrationResult> learned_;
+};
 
 struct SurveyCandidate {
   Channel channel = Channel::automatic;
@@ -31,6 +50,8 @@ struct SurveyCandidate {
   bool plausible = false;
   // Where the rest of the picture shows something else, the part in which the beads are; px of the full frame.
   std::optional<PixelRectangle> region;
+  // By their faces, where a trial searched all of the frame (SurveyOptions::search).
+  std::shared_ptr<SearchedFrame> searched;
 };
 
 struct Survey {
@@ -48,6 +69,9 @@ struct SurveyOptions {
   std::optional<PixelRectangle> roi;
   bool any_shape = false;      // outlines that are not round, and marks of a drawing, may be beads
   bool channel_alone = false;  // SurveyCandidate::by_rims is of no interest: it costs a trial of large pictures
+  // What will be searched for in the picture after the survey: then a trial is this search where it can be
+  // (SurveyCandidate::searched). Lengths are px of the full frame, `seen` and `recorded_px` are those of the survey.
+  std::optional<FindOptions> search{};
 };
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options = {});

@@ -36,6 +36,7 @@ struct GrayFrame {
 // A rectangle of pixels: columns left .. left + width - 1, rows top .. top + height - 1.
 struct PixelRectangle {
   int left = 0, top = 0, width = 0, height = 0;
+  bool operator==(const PixelRectangle&) const = default;
 };
 
 // What went wrong with an input, where, why, and what to do about it. what() is the whole sentence.

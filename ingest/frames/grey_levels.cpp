@@ -89,12 +89,11 @@ cv::Vec3f most_frequent_colour(const cv::Mat& picture) {
   return cv::Vec3f(static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2]));
 }
 
-// One level a pixel from three (blue, green, red), float.
+// One level a pixel from three (blue, green, red), float, into `level`.
 template <class Level>
-cv::Mat mixed_of(const cv::Mat& picture, GreyRule& rule) {
+void mix(const cv::Mat& picture, GreyRule& rule, cv::Mat& level) {
   if (rule.channel == Channel::background_distance && !rule.background)
     rule.background = most_frequent_colour<Level>(picture);
-  cv::Mat level(picture.rows, picture.cols, CV_32F);
   const auto fill_by = [&](const auto& level_of) {
     for (int row = 0; row < picture.rows; ++row) {
       const Level* from = picture.ptr<Level>(row);
@@ -117,12 +116,16 @@ cv::Mat mixed_of(const cv::Mat& picture, GreyRule& rule) {
       return std::sqrt(((blue - b) * (blue - b) + (green - g) * (green - g) + (red - r) * (red - r)) / 3);
     });
   }
-  return level;
 }
 cv::Mat mixed(const cv::Mat& picture, GreyRule& rule) {
-  if (picture.depth() == CV_8U) return mixed_of<std::uint8_t>(picture, rule);
-  if (picture.depth() == CV_16U) return mixed_of<std::uint16_t>(picture, rule);
-  return mixed_of<float>(picture, rule);
+  cv::Mat level(picture.rows, picture.cols, CV_32F);
+  if (picture.depth() == CV_8U)
+    mix<std::uint8_t>(picture, rule, level);
+  else if (picture.depth() == CV_16U)
+    mix<std::uint16_t>(picture, rule, level);
+  else
+    mix<float>(picture, rule, level);
+  return level;
 }
 
 // 8 bit, 16 bit or float, with one component or three (blue, green, red).
@@ -143,17 +146,12 @@ cv::Mat of_usual_kind(const cv::Mat& given) {
   return picture;
 }
 
-cv::Mat one_component(const cv::Mat& picture, const FrameSourceOptions& options, GreyRule& rule) {
-  if (picture.channels() != 3) return picture;
-  if (rule.channel == Channel::automatic)
-    rule.channel = options.channel != Channel::automatic ? options.channel : best_channel(picture);
-  if (rule.channel <= Channel::blue) {
-    cv::Mat single;
-    cv::extractChannel(picture, single, 2 - static_cast<int>(rule.channel));
-    return single;
-  }
-  if (picture.depth() == CV_8U) rule.depth_scale = 1;
-  return mixed(picture, rule);
+// Of three components; a mixture of theirs is float.
+cv::Mat one_component(const cv::Mat& picture, GreyRule& rule) {
+  if (rule.channel > Channel::blue) return mixed(picture, rule);
+  cv::Mat single;
+  cv::extractChannel(picture, single, 2 - static_cast<int>(rule.channel));
+  return single;
 }
 
 template <class Level>
@@ -231,11 +229,22 @@ GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSour
         path, "frame of " + std::to_string(given.cols) + " x " + std::to_string(given.rows) + " px is too large",
         "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to limit the memory used",
         "crop it or reduce it");
-  const cv::Mat picture = one_component(of_usual_kind(averaged(given, options.reduction)), options, rule);
+  cv::Mat picture = of_usual_kind(averaged(given, options.reduction));
   GrayFrame frame;
   frame.width = picture.cols;
   frame.height = picture.rows;
   frame.pixels.resize(picture.total());
+  if (picture.channels() == 3) {
+    if (rule.channel == Channel::automatic)
+      rule.channel = options.channel != Channel::automatic ? options.channel : best_channel(picture);
+    if (picture.depth() == CV_8U && rule.channel > Channel::blue) {  // all levels are finite, and from 0 to 255
+      rule.depth_scale = 1;
+      cv::Mat level(frame.height, frame.width, CV_32F, frame.pixels.data());
+      mix<std::uint8_t>(picture, rule, level);
+      return frame;
+    }
+    picture = one_component(picture, rule);
+  }
   if (picture.depth() == CV_8U) {
     copy_levels<std::uint8_t>(picture, 1, frame);
   } else if (picture.depth() == CV_16U) {

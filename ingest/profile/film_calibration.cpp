@@ -10,6 +10,7 @@
 #include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
 #include "ingest/find/rim_finder.hpp"
+#include "ingest/find/survey.hpp"
 #include "ingest/find/two_kinds.hpp"
 #include "ingest/profile/photographs.hpp"
 
@@ -143,13 +144,20 @@ class FilmLearner {
     });
   }
 
+  // From the frame read last, unless a survey has done so.
+  CalibrationResult learned_from_one() {
+    const GrayFrame& frame = straight_.back();
+    std::optional<CalibrationResult> known;
+    if (const auto searched = std::exchange(film_.options.searched, nullptr)) known = searched->take(frame, find_);
+    return known ? std::move(*known) : learn_beads({&frame}, find_);
+  }
+
   // With the frames before it once beads are known. Whether it shows beads.
   bool learns_from(GrayFrame frame, std::string& first_reason) {
     enlargement_ = std::max(enlargement_, frame.enlargement);
     straight_.push_back(straightened(frame));
     recorded_.push_back(std::move(frame));
-    CalibrationResult attempt = learn_beads(
-        calibrated_.found ? pointers_to(straight_) : std::vector<const GrayFrame*>{&straight_.back()}, find_);
+    CalibrationResult attempt = calibrated_.found ? learn_beads(pointers_to(straight_), find_) : learned_from_one();
     if (!attempt.found) {
       if (first_reason.empty()) first_reason = attempt.why_not;
       straight_.pop_back();

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -46,6 +47,8 @@ struct FrameReport {
 
 // Only the diameter is needed; each other member overrides something that is otherwise found. Places are those of the
 // recorded frame.
+class SearchedFrame;  // survey.hpp
+
 struct MeasureOptions {
   double bead_diameter_m = 0;              // required, > 0
   std::optional<double> scale_m_per_px{};  // else bead_diameter_m / (2 radius_px)
@@ -63,6 +66,7 @@ struct MeasureOptions {
   std::optional<double> pixel_aspect{};
   std::optional<double> lens_radial{};
   FindOptions find{};                            // polarity, radius, roi, ...
+  std::shared_ptr<SearchedFrame> searched{};     // what a survey has learned of the first frame
   Kernel kernel = measuring_kernel;              // widths in D
   double bin_width = measuring_spacing;          // D
   std::optional<double> highest{};               // D; else just above the highest centre

@@ -196,6 +196,12 @@ std::string_view to_string(FindStatus status) {
   return "";
 }
 
+std::optional<FindOptions> search_after_survey(const MeasureOptions& measure) {
+  if (measure.scale_m_per_px || measure.second_diameter_m || measure.pixel_aspect || measure.lens_radial)
+    return std::nullopt;
+  return measure.find;
+}
+
 std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
                                        const FrameSourceOptions& source) {
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
@@ -233,6 +239,11 @@ int reduction_for(int width, int height, double radius_px, bool by_rims) {
   if (!by_rims)
     by = std::max(by, std::min(static_cast<int>(radius_px / least_radius_px), by_pixels(most_surveyed_pixels)));
   return std::max(by, by_pixels(most_pixels));
+}
+
+int reduction_after(const FirstLook& look, const SurveyCandidate& chosen) {
+  if (chosen.searched) return chosen.searched->reduction();
+  return reduction_for(look.width, look.height, chosen.rims.radius_px, chosen.by_rims);
 }
 
 std::string why_reduced(int width, int height, int reduction) {
@@ -315,7 +326,9 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
   std::optional<PixelRectangle> region;
   if (!measure.find.seen) {
     FrameSource names = FrameSource::open(paths, source);
-    const auto look = look_at_first(names.first_origins(most_tried), survey_options(options.find), source);
+    SurveyOptions asked = survey_options(options.find);
+    asked.search = search_after_survey(options);
+    const auto look = look_at_first(names.first_origins(most_tried), asked, source);
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
@@ -324,8 +337,8 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
       if (const std::string why = scale_objection(measure); !why.empty())
         return refused(FindStatus::bad_input, look->path + ": " + why);
       source.channel = look->survey.candidates.front().channel;
-      source.reduction = measure.reduction = reduction_for(look->width, look->height, measure.find.seen->radius_px,
-                                                           look->survey.candidates.front().by_rims);
+      source.reduction = measure.reduction = reduction_after(*look, look->survey.candidates.front());
+      measure.searched = look->survey.candidates.front().searched;
       reduced_why = why_reduced(look->width, look->height, source.reduction);
     }
   }

@@ -65,6 +65,9 @@ struct FirstLook {
   Survey survey;
   std::shared_ptr<const CandidatePictures> picture;  // to draw candidates into; none where one channel was asked for
 };
+// What is searched for after a survey, for SurveyOptions::search. None where scale, second diameter or lens are given:
+// the search then differs from a survey's trial.
+std::optional<FindOptions> search_after_survey(const MeasureOptions& measure);
 // The first `most_tried` of `pictures` are tried; nothing when none of them can be read.
 inline constexpr std::size_t most_tried = 10;
 std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
@@ -86,6 +89,8 @@ constexpr double least_reduced_radius_px = 3;
 // million pixels. Where beads are found by their rims alone it is 24 to 48 px. 1 below two million pixels. Frames of
 // more pixels than are held in memory (FrameSourceOptions::largest_frame_pixels) are always reduced.
 int reduction_for(int width, int height, double radius_px, bool by_rims = false);
+// The same for the beads of a survey: the reduction at which they have been searched, if they have.
+int reduction_after(const FirstLook& look, const SurveyCandidate& chosen);
 // The sentence that says so for the latter; empty for smaller frames.
 std::string why_reduced(int width, int height, int reduction);
 

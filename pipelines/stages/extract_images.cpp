@@ -76,7 +76,7 @@ struct UsedLook {
 };
 UsedLook use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
                         ingest::MeasureOptions& measure) {
-  std::optional<FirstLook> look = look_at_first(film.paths, options);
+  std::optional<FirstLook> look = look_at_first(film.paths, options, LookFor::search);
   std::error_code error;
   fs::remove_all(refusal_folder(context), error);
   if (!look) return {};  // measure_bed() says which files cannot be read

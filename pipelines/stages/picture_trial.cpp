@@ -146,8 +146,8 @@ void go_on_with(const ingest::SurveyCandidate& chosen, const FirstLook& look, in
   source.channel = chosen.channel;
   if (!measure.find.roi) measure.find.roi = chosen.region;
   measure.find.seen = ingest::BeadsSeen{chosen.rims.polarity, chosen.rims.radius_px, chosen.one_sided};
-  source.reduction = measure.reduction =
-      ingest::reduction_for(look.width, look.height, chosen.rims.radius_px, chosen.by_rims);
+  source.reduction = measure.reduction = ingest::reduction_after(look, chosen);
+  measure.searched = chosen.searched;
 }
 
 Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& found) {

@@ -9,6 +9,7 @@
 
 #include "ingest/profile/candidate_picture.hpp"
 #include "pipelines/formats/files.hpp"
+#include "pipelines/stages/picture_trial.hpp"
 
 namespace shakebed::pipelines {
 namespace {
@@ -112,6 +113,7 @@ std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, co
                                        LookFor purpose) {
   ingest::SurveyOptions asked = survey_asked_for(options);
   asked.channel_alone = purpose == LookFor::preview;
+  if (purpose == LookFor::search && !options.reduction) asked.search = ingest::search_after_survey(asked_for(options));
   ingest::FrameSourceOptions source;
   source.channel = channel_of(options.channel);
   std::vector<ingest::FrameOrigin> pictures;

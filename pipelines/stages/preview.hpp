@@ -26,8 +26,9 @@ inline ingest::Channel channel_of(BeadChannel channel) {
 ingest::SurveyOptions survey_asked_for(const ExtractOptions& options);
 
 // The first readable picture of `paths`, surveyed as the options ask. What only a run needs to know takes time.
+// `search`: the search of these pictures follows, and may begin with what the survey learns.
 using ingest::FirstLook;
-enum class LookFor { run, preview };
+enum class LookFor { run, search, preview };
 std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options,
                                        LookFor purpose = LookFor::run);
 

@@ -217,6 +217,38 @@ TEST(Photographs, LengthsOfAReducedBedAreThoseOfThePicture) {
   EXPECT_LT(std::sqrt(0.5 * squares / static_cast<double>(disks.size())), 0.03) << "px per axis";
 }
 
+// Beads are red on grey. What the survey of its channels has learned is what the search alone learns.
+TEST(Photographs, AColourPictureIsMeasuredAsInItsChannelAlone) {
+  const test::ScratchFolder folder;
+  const GrayFrame frame = drawn(1);
+  std::ofstream file(folder / "bed.ppm", std::ios::binary);
+  file << "P6 300 240 255\n";
+  for (const float level : frame.pixels) file << static_cast<char>(level) << "PP";
+  file.close();
+  MeasureOptions options{.bead_diameter_m = 3e-3};
+  const BedFound found = measure_bed({folder / "bed.ppm"}, options);
+  SurveyOptions asked;
+  asked.search = search_after_survey(options);
+  const auto look = look_at_first({{folder / "bed.ppm", 0}}, asked);
+  const SurveyCandidate& seen = look->survey.candidates.front();
+  EXPECT_NE(seen.searched, nullptr);
+  options.find.seen = BeadsSeen{seen.rims.polarity, seen.rims.radius_px, seen.one_sided};
+  const BedFound alone = measure_bed({folder / "bed.ppm"}, options, {.channel = seen.channel});
+  ASSERT_TRUE(found.ok() && alone.ok()) << found.message << alone.message;
+  ASSERT_EQ(found.measurement.disks.size(), alone.measurement.disks.size());
+  EXPECT_EQ(found.measurement.calibration.radius_px, alone.measurement.calibration.radius_px);
+  for (std::size_t k = 0; k < found.measurement.disks.size(); ++k)
+    EXPECT_EQ(found.measurement.disks[k].x_px, alone.measurement.disks[k].x_px);
+  const GrayFrame in_channel = read_frame(folder / "bed.ppm", 0, {.channel = seen.channel});
+  options.searched = look_at_first({{folder / "bed.ppm", 0}}, asked)->survey.candidates.front().searched;
+  FrameSource source = FrameSource::from_frames({in_channel});
+  measure_bed(source, options);
+  EXPECT_FALSE(options.searched->take(in_channel, options.find)) << "the measurement took it";
+  EXPECT_TRUE(seen.searched->take(in_channel, options.find));
+  options.second_diameter_m = 2e-3;
+  EXPECT_FALSE(search_after_survey(options)) << "both kinds are searched for together";
+}
+
 TEST(Photographs, PicturesThatCannotBeReadAreSkippedInTheFirstLook) {
   const test::ScratchFolder folder;
   std::ofstream(folder / "broken.png") << "no picture";
