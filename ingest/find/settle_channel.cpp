@@ -55,7 +55,7 @@ constexpr std::size_t most_channels = 2;
 
 // Beads that are so many, so much of all edges and so sure are expected to be found by their faces.
 constexpr std::size_t many = 50;
-constexpr double most_of_the_edges = 0.5, hardly_wrong = 0.02;
+constexpr double most_of_the_edges = 0.5, almost_none_wrong = 0.02;
 
 // Whether beads of another shade count, which a run finds, too: this takes a tenth of a trial's time or more.
 enum class Shades { common, where_doubtful, all };
@@ -238,7 +238,7 @@ class ChannelTrials {
     if (factor_ > 1 || options.roi || best_.region || picture.enlargement > 1) return false;
     if (frames_.reduction > 1 && radius_px() < trial_radius_px) return false;
     const bool plain = best_.disks.size() >= many && best_.explained_share >= most_of_the_edges &&
-                       best_.expected_wrong <= hardly_wrong;
+                       best_.expected_wrong <= almost_none_wrong;
     return plain || (part_.width == picture.width && part_.height == picture.height);
   }
 

@@ -134,7 +134,15 @@ struct FrameSource::State {
     return *pages[which];
   }
 
-  // The next item without regard to the stride. `skip`: step over it without decoding.
+  // Whether the frame is one of those asked for, and how many such come before it.
+  [[nodiscard]] bool wanted(std::size_t frame) const {
+    return frame >= options.skip && (frame - options.skip) % options.stride == 0;
+  }
+  [[nodiscard]] std::size_t wanted_before(std::size_t frame) const {
+    return frame <= options.skip ? 0 : (frame - options.skip + options.stride - 1) / options.stride;
+  }
+
+  // The next item, wanted or not. `skip`: step over it without decoding.
   std::optional<FrameSource::Item> step(bool skip) {
     Item item;
     item.index = index;
@@ -285,11 +293,10 @@ FrameSource FrameSource::from_frames(std::vector<GrayFrame> frames) {
 }
 
 std::optional<FrameSource::Item> FrameSource::next_item() {
-  const std::size_t stride = state_->options.stride;
-  while (state_->index % stride != 0)
+  while (!state_->wanted(state_->index))
     if (!state_->step(true)) return std::nullopt;
   auto item = state_->step(false);
-  if (item) item->index /= stride;
+  if (item) item->index = state_->wanted_before(item->index);
   return item;
 }
 
@@ -313,7 +320,7 @@ std::vector<FrameOrigin> FrameSource::first_origins(std::size_t most) {
   while (origins.size() < most) {
     const auto item = state_->step(true);
     if (!item) break;
-    if (item->index % state_->options.stride == 0) origins.push_back(item->origin);
+    if (state_->wanted(item->index)) origins.push_back(item->origin);
   }
   rewind();
   return origins;
@@ -331,14 +338,13 @@ std::optional<double> FrameSource::film_rate_hz() const {
 }
 
 std::optional<std::size_t> FrameSource::count_if_known() const {
-  const std::size_t stride = state_->options.stride;
-  if (state_->make) return (state_->made_count + stride - 1) / stride;
+  if (state_->make) return state_->wanted_before(state_->made_count);
   std::size_t count = 0;
   for (std::size_t which = 0; which < state_->entries.size(); ++which) {
     if (state_->entries[which].kind == Kind::film) return std::nullopt;
     count += state_->entries[which].kind == Kind::tiff ? state_->page_count(which) : 1;
   }
-  return (count + stride - 1) / stride;
+  return state_->wanted_before(count);
 }
 
 const char* name_of(Channel channel) {

@@ -73,8 +73,9 @@ struct FrameSourceOptions {
   std::size_t largest_decoded_pixels = 1'000'000'000;
   // Frames are averaged over squares of so many pixels; pixels left over at the right and at the bottom are dropped.
   int reduction = 1;
-  // Keep every `stride`-th frame of the stream, the first included.
-  std::size_t stride = 1;
+  // Leave out so many frames at the beginning of the stream, and keep every `stride`-th of the others, the first
+  // included.
+  std::size_t skip = 0, stride = 1;
 };
 
 // A stream of frames, one in memory at a time. Files are read in the order given; folders and globs (`*`, `?`, `[..]`)

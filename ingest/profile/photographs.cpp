@@ -207,7 +207,12 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
     try {
       const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, most_surveyed_pixels, source);
-      FirstLook look{pictures[k].path, frames.width, frames.height, take_survey(frames, options), nullptr};
+      FirstLook look{.path = pictures[k].path,
+                     .width = frames.width,
+                     .height = frames.height,
+                     .survey = take_survey(frames, options),
+                     .picture = nullptr,
+                     .page = pictures[k].page};
       if (source.channel == Channel::automatic) look.picture = std::make_shared<const CandidatePictures>(frames);
       return look;
     } catch (const InputError&) {

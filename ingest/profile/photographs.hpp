@@ -64,6 +64,7 @@ struct FirstLook {
   int width = 0, height = 0;  // of the picture itself
   Survey survey;
   std::shared_ptr<const CandidatePictures> picture;  // to draw candidates into; none where one channel was asked for
+  std::size_t page = 0;                              // of a file with several pictures
 };
 // What is searched for after a survey, for SurveyOptions::search. None where scale, second diameter or lens are given:
 // the search then differs from a survey's trial.

@@ -125,8 +125,8 @@ int fit_some_images(const Call& call, const FitImagesArguments& image, const Bud
   };
   install_interrupt_handler();
   const fs::path out = out_of(call, plan(1, {}).name);
-  const BudgetedFrames chosen =
-      frames_by_budget({budget, image.files, out, image.run.jobs, image.run.force, plan}, console);
+  const BudgetedFrames chosen = frames_by_budget(
+      {budget, image.files, image.skip.value_or(0), out, image.run.jobs, image.run.force, plan}, console);
   some.run.chosen = chosen.record;
   Json answer;
   const int code =

@@ -53,7 +53,8 @@ class FrameBudget {
   FrameBudget(const FrameBudgetRequest& request, Console& console) : request_(request), console_(console) {}
 
   BudgetedFrames choose() {
-    const std::uint64_t all = images_module().count_frames(request_.files);
+    const std::uint64_t there = images_module().count_frames(request_.files);
+    const std::uint64_t all = there - std::min(there, request_.skip);
     if (all <= pilot_frames) {
       console_.message(fmt::format("--budget \"{}\": all {} frames are measured", request_.budget.text, all));
       return {1, {}, record_of({1, all, 0, 0, true}, {}, all)};

@@ -18,6 +18,7 @@ namespace shakebed::pipelines {
 struct FrameBudgetRequest {
   Budget budget;
   std::vector<std::string> files;
+  std::uint64_t skip = 0;     // frames left out at the beginning
   std::filesystem::path out;  // of the run; pilots are below OUT/.pilot
   int jobs = 0;
   bool force = false;

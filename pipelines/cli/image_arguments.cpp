@@ -72,7 +72,7 @@ Json extract_stage(const ImageArguments& image) {
   give("shape", image.shape);
   give("second_diameter", image.second_diameter), give("gravity", image.gravity);
   give("pixel_aspect", image.pixel_aspect), give("lens", image.lens), give("bead_number", image.bead_number);
-  give("stride", image.stride), give("reduction", image.reduction);
+  give("skip", image.skip), give("stride", image.stride), give("reduction", image.reduction);
   if (image.kernel) stage["kernel"] = kernel_json(*image.kernel);
   give("frame_rate", image.frame_rate);
   if (image.frame_rate) give("frequency", image.frequency);
@@ -150,6 +150,7 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
                      "positive for a barrel (default: found)");
   command.add_option("--bead-number", image.bead_number,
                      "number of beads in view; missed and doubled beads are then reported");
+  command.add_option("--skip", image.skip, "number of frames that are left out at the beginning (default: 0)");
 }
 
 void add_film_options(CLI::App& command, ImageArguments& image) {

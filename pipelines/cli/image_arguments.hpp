@@ -18,7 +18,7 @@ struct ImageArguments {
   std::optional<std::string> scale, frequency, amplitude, frame_rate, gravity, polarity, second_diameter, kernel,
       channel, shape;
   std::optional<double> plateau_density, floor, left_wall, right_wall, pixel_aspect, lens, radius;
-  std::optional<std::uint64_t> bead_number, stride, reduction;
+  std::optional<std::uint64_t> bead_number, skip, stride, reduction;
   std::vector<double> roi;
 };
 

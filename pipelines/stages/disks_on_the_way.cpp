@@ -151,7 +151,7 @@ DisksOnTheWay::Centres DisksOnTheWay::truth_of(std::size_t frame) {
 
 // Nearest true centre of each disk found, each true centre used once.
 void DisksOnTheWay::compare(std::size_t index, const std::vector<ingest::MeasuredDisk>& disks) {
-  Centres truth = truth_of(index * options_.stride);
+  Centres truth = truth_of(options_.skip + index * options_.stride);
   Marks marks;
   std::sort(truth.begin(), truth.end());
   real_ += truth.size(), reported_ += disks.size();

@@ -92,6 +92,8 @@ void describe_frames(Fields& fields, ExtractOptions& o) {
   fields.integer(
       "bead_number", o.bead_number,
       {.help = "number of beads in view, if known; missed and doubled beads are then reported", .range = at_least(1)});
+  fields.integer("skip", o.skip,
+                 {.help = "number of frames that are left out at the beginning", .range = from_to(0, 1'000'000'000)});
   fields.integer(
       "stride", o.stride,
       {.help = "step between the frames that are used: 1 for all, 2 for every second one", .range = at_least(1)});

@@ -47,12 +47,12 @@ std::string advice(const ExtractOptions& options, RunContext& context, const Fir
 
 // Says what the first frame shows instead of beads, or instead of those described.
 [[noreturn]] void refuse(const ExtractOptions& options, RunContext& context, const FirstLook& look,
-                         const std::vector<std::string>& paths, const std::string& why) {
+                         const std::vector<ingest::FrameOrigin>& pictures, const std::string& why) {
   context.progress(0, "trying other options");
   const std::vector<Proposal> proposals = proposals_for(look, options, RefusedBy::first_look);
   const std::string what = fmt::format("{}: {}", look.path, why);
   if (proposals.empty())
-    if (const std::string others = advice_of_other_pictures(paths, options); !others.empty())
+    if (const std::string others = advice_of_other_pictures(pictures, options); !others.empty())
       throw StageError(fmt::format("{}. {}", what, others));
   throw StageError(fmt::format("{}. {}", what, advice(options, context, look, proposals)));
 }
@@ -76,17 +76,18 @@ struct UsedLook {
 };
 UsedLook use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
                         ingest::MeasureOptions& measure) {
-  std::optional<FirstLook> look = look_at_first(film.paths, options, LookFor::search);
+  const std::vector<ingest::FrameOrigin> pictures = first_pictures(film.paths, film.source);
+  std::optional<FirstLook> look = look_at_first(pictures, options, LookFor::search);
   std::error_code error;
   fs::remove_all(refusal_folder(context), error);
   if (!look) return {};  // measure_bed() says which files cannot be read
   require_inside(options, *look);
-  if (!look->survey.found) refuse(options, context, *look, film.paths, "no beads: " + look->survey.why_not);
+  if (!look->survey.found) refuse(options, context, *look, pictures, "no beads: " + look->survey.why_not);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);
   if (options.scale)
     if (const std::string why = ingest::why_not_scale(options.diameter, *options.scale, chosen->rims.radius_px);
         !why.empty())
-      refuse(options, context, *look, film.paths, why);
+      refuse(options, context, *look, pictures, why);
   if (chosen->not_round)
     context.warning(fmt::format(
         "{}: the outlines are not those of disks ({}). They are measured because shape is \"any\". If these are your "
@@ -147,10 +148,11 @@ class Extraction {
       context_.progress(done > 0 ? time_.fraction() : 0, done > 0 ? "finding disks" : "searching for beads");
     });
     measure_.threads = static_cast<unsigned>(context_.jobs());
-    film_.source.stride = options_.stride;
+    film_.source.skip = options_.skip, film_.source.stride = options_.stride;
     film_.source.channel = channel_of(options_.channel);
     if (rendered_ != nullptr) {
       use_rendered();
+      first_pictures(film_.paths, film_.source);  // refuses where none is left
     } else {
       film_.paths = named_pictures(options_.images);
       read_sides();
@@ -218,8 +220,8 @@ class Extraction {
   // Pictures of a simulated bed with periodic sides say so.
   void read_sides() {
     if (measure_.left_wall_px || measure_.find.roi) return;
-    const auto first = ingest::FrameSource::open(film_.paths, film_.source).first_origins(1);
-    const auto said = first.empty() ? std::nullopt : ingest::png_text(first.front().path, FrameGeometry::keyword);
+    const auto first = first_pictures(film_.paths, film_.source);
+    const auto said = ingest::png_text(first.front().path, FrameGeometry::keyword);
     const auto geometry = said ? FrameGeometry::from_sides_text(said->text) : std::nullopt;
     if (!geometry) return;
     if (geometry->width != said->width || geometry->height != said->height) {

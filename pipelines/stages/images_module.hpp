@@ -61,7 +61,7 @@ struct ExtractOptions {
   std::optional<double> lowest, highest;        // of the profile [D]
   std::optional<double> frequency, frame_rate;  // [Hz]: phase-resolved profiles; the first is found
   std::optional<std::uint64_t> bead_number;     // how many beads there are in view, if known
-  std::uint64_t stride = 1;                     // every so many frames
+  std::uint64_t skip = 0, stride = 1;           // frames left out at the beginning; then every so many frames
   std::optional<std::uint64_t> reduction;       // side of the squares averaged [px]; by the size of the beads
   std::uint64_t overlays = 1;                   // frames drawn with what was found
 };

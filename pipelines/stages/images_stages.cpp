@@ -17,12 +17,11 @@ namespace shakebed::pipelines {
 namespace {
 
 Previewed preview_images(const PreviewRequest& request) {
-  ingest::FrameSource source = ingest::FrameSource::open(request.files, {});
-  std::vector<std::string> paths;
-  for (const ingest::FrameOrigin& origin : source.first_origins(ingest::most_tried))
-    if (paths.empty() || paths.back() != origin.path) paths.push_back(origin.path);
-  const std::optional<FirstLook> look = look_at_first(paths, request.options, LookFor::preview);
-  if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", paths.front()));
+  ingest::FrameSourceOptions kept;
+  kept.skip = request.options.skip;
+  const std::vector<ingest::FrameOrigin> pictures = first_pictures(request.files, kept);
+  const std::optional<FirstLook> look = look_at_first(pictures, request.options, LookFor::preview);
+  if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", pictures.front().path));
   require_inside(request.options, *look);
   std::string why;
   if (!look->survey.found)

@@ -46,9 +46,14 @@ const ingest::GrayFrame& frame_in(const ingest::ChannelFrames& frames, ingest::C
   return (its != frames.channels.end() ? *its : frames.channels.front()).frame;
 }
 
-FirstLook look_at_reduced(const std::string& picture, const ExtractOptions& options,
+FirstLook look_at_reduced(const ingest::FrameOrigin& picture, const ExtractOptions& options,
                           const ingest::ChannelFrames& reduced) {
-  FirstLook look{picture, reduced.width, reduced.height, {}, nullptr};
+  FirstLook look{.path = picture.path,
+                 .width = reduced.width,
+                 .height = reduced.height,
+                 .survey = {},
+                 .picture = nullptr,
+                 .page = picture.page};
   const ingest::SurveyOptions asked = survey_asked_for(options);
   if (options.channel == BeadChannel::automatic) {
     look.survey = ingest::take_survey(reduced, asked);
@@ -174,7 +179,7 @@ std::optional<ingest::ChannelFrames> reduced_for_trials(const FirstLook& look, d
   if (factor < 2) return std::nullopt;
   try {
     const std::size_t pixels = static_cast<std::size_t>(look.width) * static_cast<std::size_t>(look.height);
-    return ingest::read_channels(look.path, 0, pixels / static_cast<std::size_t>(factor * factor));
+    return ingest::read_channels(look.path, look.page, pixels / static_cast<std::size_t>(factor * factor));
   } catch (const ingest::InputError&) {
     return std::nullopt;
   }
@@ -212,7 +217,7 @@ std::optional<Trial> tried_after(const FirstLook& look, const ExtractOptions& op
   go_on_with(chosen, look, source, measure);
   if (reduced != nullptr) measure.reduction = reduced->reduction;
   ingest::FrameSource one = ingest::FrameSource::from_generator(1, [&](std::size_t) {
-    return reduced != nullptr ? frame_in(*reduced, source.channel) : ingest::read_frame(look.path, 0, source);
+    return reduced != nullptr ? frame_in(*reduced, source.channel) : ingest::read_frame(look.path, look.page, source);
   });
   const ingest::Measurement found = ingest::measure_bed(one, measure);
   return judged(options, found, found.disks);
@@ -234,7 +239,7 @@ std::optional<Trial> unless_refused(const Try& attempt) {
 
 }  // namespace
 
-std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
+std::optional<Trial> try_options(const ingest::FrameOrigin& picture, const ExtractOptions& options,
                                  const ingest::ChannelFrames* reduced) {
   return unless_refused([&]() -> std::optional<Trial> {
     const std::optional<FirstLook> look =

@@ -47,7 +47,7 @@ struct Trial {
   ingest::SurveyCandidate found;  // the disks, to be drawn
 };
 // Nothing where the run refuses it. `reduced`: the picture for a quick trial, which may be wrong.
-std::optional<Trial> try_options(const std::string& picture, const ExtractOptions& options,
+std::optional<Trial> try_options(const ingest::FrameOrigin& picture, const ExtractOptions& options,
                                  const ingest::ChannelFrames* reduced = nullptr);
 // The same after a first look at the picture with these options. Beads are searched as quickly as by_rims_alone says.
 enum class TrialSearch { as_the_run, by_rims_alone };

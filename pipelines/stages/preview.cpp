@@ -68,6 +68,7 @@ std::string words_of(const ExtractOptions& options) {
   if (options.pixel_aspect) text += fmt::format(" --pixel-aspect {:g}", *options.pixel_aspect);
   if (options.lens_radial) text += fmt::format(" --lens {:g}", *options.lens_radial);
   if (options.bead_number) text += fmt::format(" --bead-number {}", *options.bead_number);
+  if (options.skip > 0) text += fmt::format(" --skip {}", options.skip);
   if (options.channel != BeadChannel::automatic)
     text += fmt::format(" --channel {}", ingest::name_of(channel_of(options.channel)));
   if (options.polarity != BeadPolarity::automatic)
@@ -109,15 +110,25 @@ ingest::SurveyOptions survey_asked_for(const ExtractOptions& options) {
   return asked;
 }
 
-std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options,
+std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& files,
+                                                const ingest::FrameSourceOptions& source) {
+  std::vector<ingest::FrameOrigin> pictures =
+      ingest::FrameSource::open(files, source).first_origins(ingest::most_tried);
+  if (pictures.empty())
+    throw StageError(
+        fmt::format("{}: no frame is left, because skip leaves out {} frames at the beginning. Give a "
+                    "smaller number",
+                    files.front(), source.skip));
+  return pictures;
+}
+
+std::optional<FirstLook> look_at_first(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options,
                                        LookFor purpose) {
   ingest::SurveyOptions asked = survey_asked_for(options);
   asked.channel_alone = purpose == LookFor::preview;
   if (purpose == LookFor::search && !options.reduction) asked.search = ingest::search_after_survey(asked_for(options));
   ingest::FrameSourceOptions source;
   source.channel = channel_of(options.channel);
-  std::vector<ingest::FrameOrigin> pictures;
-  for (const std::string& path : paths) pictures.push_back({path, 0});
   return ingest::look_at_first(pictures, asked, source);
 }
 
@@ -168,7 +179,7 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
                 "not tried.</p>\n"
               : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const std::shared_ptr<const ingest::CandidatePictures> drawn =
-      look.picture ? look.picture : std::make_shared<const ingest::CandidatePictures>(std::filesystem::path(look.path));
+      look.picture ? look.picture : std::make_shared<const ingest::CandidatePictures>(look.path, look.page);
   const ingest::CandidatePictures& pictures = *drawn;
   std::size_t number = 0;
   for (const Proposal& proposal : proposals) {

@@ -25,11 +25,15 @@ inline ingest::Channel channel_of(BeadChannel channel) {
 // What the options ask of a survey.
 ingest::SurveyOptions survey_asked_for(const ExtractOptions& options);
 
-// The first readable picture of `paths`, surveyed as the options ask. What only a run needs to know takes time.
+// The first frames, at most as many as a first look tries. Throws StageError where `skip` leaves none.
+std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& files,
+                                                const ingest::FrameSourceOptions& source);
+
+// The first readable one of the pictures, surveyed as the options ask. What only a run needs to know takes time.
 // `search`: the search of these pictures follows, and may begin with what the survey learns.
 using ingest::FirstLook;
 enum class LookFor { run, search, preview };
-std::optional<FirstLook> look_at_first(const std::vector<std::string>& paths, const ExtractOptions& options,
+std::optional<FirstLook> look_at_first(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options,
                                        LookFor purpose = LookFor::run);
 
 // A change of the options with which the picture was measured, and not refused (proposals.hpp).

@@ -176,7 +176,7 @@ class Proposer {
 
   // What was measured, if these options choose the same beads in the picture.
   std::optional<Trial> found_with(const ExtractOptions& open) {
-    const std::optional<FirstLook> look = look_at_first({look_.path}, open);
+    const std::optional<FirstLook> look = look_at_first({origin()}, open);
     if (!look || !look->survey.found) return std::nullopt;
     if (measured_ != nullptr && measured_->frames.size() == 1 && look_.survey.found &&
         same_start(chosen_of(look->survey, open), chosen_of(look_.survey, options_)))
@@ -209,7 +209,7 @@ class Proposer {
     change(options);
     if (excluded_at_a_glance(options)) return false;
     if (searches_ >= most_searches) return false;
-    const std::optional<FirstLook> look = look_at_first({look_.path}, options);
+    const std::optional<FirstLook> look = look_at_first({origin()}, options);
     const std::optional<Trial> trial = look ? searched(*look, options) : std::nullopt;
     if (!trial) return false;
     add(std::move(options), *trial, std::move(without), std::move(give));
@@ -238,8 +238,10 @@ class Proposer {
       reduced_ = reduced_for_trials(look_, radius);
       reduced_for_px_ = radius;
     }
-    return reduced_ && !try_options(look_.path, options, &*reduced_);
+    return reduced_ && !try_options(origin(), options, &*reduced_);
   }
+
+  [[nodiscard]] ingest::FrameOrigin origin() const { return {look_.path, look_.page}; }
 
   const FirstLook& look_;
   const ExtractOptions& options_;
@@ -283,11 +285,16 @@ std::string advice_of(const std::vector<Proposal>& proposals, const ExtractOptio
                        : fmt::format("If this is such a photograph, give {}", fmt::join(left, " and ")));
 }
 
-std::string advice_of_other_pictures(const std::vector<std::string>& paths, const ExtractOptions& options) {
-  for (std::size_t k = 1; k < std::min(paths.size(), 1 + most_other_pictures); ++k)
-    if (const std::optional<Trial> trial = try_options(paths[k], options))
-      return fmt::format("{} shows {} beads: leave out the picture{} before it",
-                         std::filesystem::path(paths[k]).filename().string(), trial->beads, k == 1 ? "" : "s");
+std::string advice_of_other_pictures(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options) {
+  for (std::size_t k = 1; k < std::min(pictures.size(), 1 + most_other_pictures); ++k) {
+    const std::optional<Trial> trial = try_options(pictures[k], options);
+    if (!trial) continue;
+    const bool same_file = pictures[k].path == pictures.front().path;
+    return fmt::format("{} shows {} beads: give --skip {}, which leaves out the picture{} before it",
+                       same_file ? fmt::format("picture {} of it", 1 + pictures[k].page)
+                                 : std::filesystem::path(pictures[k].path).filename().string(),
+                       trial->beads, options.skip + k * options.stride, k == 1 ? "" : "s");
+  }
   return "";
 }
 

@@ -21,6 +21,6 @@ std::vector<Proposal> proposals_for(const FirstLook& look, const ExtractOptions&
 std::string advice_of(const std::vector<Proposal>& proposals, const ExtractOptions& options);
 
 // Of several pictures, the first that shows beads after those that do not: a sentence, empty where none does.
-std::string advice_of_other_pictures(const std::vector<std::string>& paths, const ExtractOptions& options);
+std::string advice_of_other_pictures(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options);
 
 }  // namespace shakebed::pipelines

@@ -72,9 +72,9 @@ TEST(FrameStream, CountsItsFrames) {
   for (int k = 0; k < 5; ++k) pages.emplace_back(3, 4, CV_8U, cv::Scalar(10 * k));
   cv::imwritemulti(folder / "pages.tif", pages);
   write_png(folder / "one.png", test::even_frame(4, 3, 99));
-  const auto open = [&](std::size_t stride) {
+  const auto open = [&](std::size_t stride, std::size_t skip = 0) {
     FrameSourceOptions options;
-    options.stride = stride;
+    options.stride = stride, options.skip = skip;
     return FrameSource::open({folder / "pages.tif", folder / "one.png", folder / "pages.tif"}, options);
   };
   EXPECT_EQ(first_levels(open(1)), (std::vector<double>{0, 10, 20, 30, 40, 99, 0, 10, 20, 30, 40}));
@@ -84,6 +84,16 @@ TEST(FrameStream, CountsItsFrames) {
   EXPECT_EQ(open(1).count_if_known(), 11U);
   EXPECT_EQ(open(3).count_if_known(), 4U);
   EXPECT_EQ(open(5).count_if_known(), 3U);
+  EXPECT_EQ(first_levels(open(1, 4)), (std::vector<double>{40, 99, 0, 10, 20, 30, 40}));
+  EXPECT_EQ(first_levels(open(3, 2)), (std::vector<double>{20, 99, 20}));
+  EXPECT_EQ(first_levels(open(2, 11)), (std::vector<double>{}));
+  EXPECT_EQ(open(1, 4).count_if_known(), 7U);
+  EXPECT_EQ(open(3, 2).count_if_known(), 3U);
+  EXPECT_EQ(open(2, 11).count_if_known(), 0U);
+  FrameSource late = open(3, 2);
+  EXPECT_EQ(late.first_origins(1).front().page, 2U);
+  EXPECT_EQ(late.next_item()->index, 0U);
+  EXPECT_EQ(late.next_item()->index, 1U) << "of the frames that are kept";
   FrameSource source = open(3);
   const auto origins = source.first_origins(3);
   ASSERT_EQ(origins.size(), 3U);

@@ -395,18 +395,18 @@ TEST(PictureTrial, OnAReducedPictureFindsTheSameBeads) {
   write_text(path, PaintedPicture(500, 400).disks(places, radius, 60).noise(2).pgm());
   ExtractOptions options = some_options();
   options.bead_number.reset();
-  const std::optional<FirstLook> look = look_at_first({path}, options);
+  const std::optional<FirstLook> look = look_at_first({{path}}, options);
   ASSERT_TRUE(look);
   const auto reduced = reduced_for_trials(*look, radius);
   ASSERT_TRUE(reduced);
   EXPECT_EQ(reduced->reduction, 2);
-  const std::optional<Trial> trial = try_options(path, options, &*reduced);
+  const std::optional<Trial> trial = try_options({path}, options, &*reduced);
   ASSERT_TRUE(trial);
   EXPECT_EQ(trial->beads, places.size());
   EXPECT_NEAR(trial->radius_px, radius, 0.5);
   EXPECT_FALSE(reduced_for_trials(*look, 19)) << "such beads would be too small";
   options.roi = {0, 0, 500, 60};
-  EXPECT_FALSE(try_options(path, options, &*reduced)) << "no bead lies there";
+  EXPECT_FALSE(try_options({path}, options, &*reduced)) << "no bead lies there";
 }
 
 // Disks two diameters apart are refused. Searching is counted by how often it asks whether to stop: what was found is
@@ -423,7 +423,7 @@ TEST(PictureTrial, OfWhatWasMeasuredIsNoSearch) {
   any.shape = BeadShape::any;
   std::size_t asked = 0;
   const ingest::StopQuestion counted([&] { ++asked; });
-  const std::optional<FirstLook> look = look_at_first({path}, options);
+  const std::optional<FirstLook> look = look_at_first({{path}}, options);
   ASSERT_TRUE(look && look->survey.found);
   ingest::MeasureOptions measure = asked_for(options);
   ingest::FrameSourceOptions source;
@@ -437,7 +437,7 @@ TEST(PictureTrial, OfWhatWasMeasuredIsNoSearch) {
   ASSERT_EQ(proposals.size(), 2U);  // a scale is one of them, and was tried
   EXPECT_EQ(proposals[1].give, "--shape any");
   EXPECT_EQ(proposals[1].found.disks.size(), places.size());
-  const std::optional<Trial> trial = try_options(path, any);
+  const std::optional<Trial> trial = try_options({path}, any);
   ASSERT_TRUE(trial);
   EXPECT_EQ(trial->beads, places.size());
 }
@@ -455,7 +455,7 @@ TEST(PictureTrial, ByRimsAloneFindsTheBeadsOfTheRun) {
   ExtractOptions options = some_options();
   options.bead_number.reset();
   options.shape = BeadShape::any;
-  const std::optional<FirstLook> look = look_at_first({path}, options);
+  const std::optional<FirstLook> look = look_at_first({{path}}, options);
   ASSERT_TRUE(look && look->survey.found);
   const std::optional<Trial> quick = try_after_look(*look, options, TrialSearch::by_rims_alone);
   const std::optional<Trial> whole = try_after_look(*look, options, TrialSearch::as_the_run);

@@ -316,10 +316,57 @@ TEST(FollowedAdvice, OnAPictureWithoutBeadsBeforeOthersIsToLeaveItOut) {
   const ProgramResult refused = runner.run(arguments);
   ASSERT_EQ(refused.exit_code, 5);
   EXPECT_THAT(refused.err, HasSubstr("second.pgm shows " + std::to_string(bed().size()) +
-                                     " beads: leave out the picture before it"));
-  arguments.erase(arguments.begin() + 1);
+                                     " beads: give --skip 1, which leaves out the picture before it"));
+  arguments.insert(arguments.end(), {"--skip", "1"});
   EXPECT_EQ(runner.run(arguments).exit_code, 0);
   EXPECT_NEAR(runner.beads(), number_of_beads(), 0);
+}
+
+// A TIFF of 8-bit grey pages, uncompressed, from binary PGM files of the same size.
+std::string stack_of(const std::vector<std::string>& pages) {
+  std::string tiff;
+  const auto put = [&tiff](unsigned value, int bytes) {
+    for (int k = 0; k < bytes; ++k) tiff += static_cast<char>(value >> (8 * k) & 0xFFU);
+  };
+  constexpr unsigned entries = 9, directory_bytes = 2 + 12 * entries + 4, pixels = width * height;
+  tiff = "II*";
+  tiff += '\0';
+  put(8, 4);
+  for (std::size_t k = 0; k < pages.size(); ++k) {
+    const auto begin = static_cast<unsigned>(tiff.size()) + directory_bytes;
+    put(entries, 2);
+    // Width, height, bits, no compression, black is 0, place of the pixels, components, rows, bytes.
+    for (const auto& [tag, value] : {std::pair(256U, unsigned{width}),
+                                     {257U, unsigned{height}},
+                                     {258U, 8U},
+                                     {259U, 1U},
+                                     {262U, 1U},
+                                     {273U, begin},
+                                     {277U, 1U},
+                                     {278U, unsigned{height}},
+                                     {279U, pixels}})
+      put(tag, 2), put(4, 2), put(1, 4), put(value, 4);
+    put(k + 1 < pages.size() ? begin + pixels : 0, 4);
+    tiff += pages[k].substr(pages[k].size() - pixels);
+  }
+  return tiff;
+}
+
+TEST(FollowedAdvice, OnAStackThatBeginsWithoutBeadsIsToSkipItsFirstPictures) {
+  Runner runner(nothing());
+  write_text(runner.folder() / "stack.tif", stack_of({nothing(), nothing(), dark_beads(), dark_beads()}));
+  Words arguments{"fit-images", "stack.tif", "--diameter", "3 mm"};
+  const ProgramResult refused = runner.run(arguments);
+  ASSERT_EQ(refused.exit_code, 5);
+  EXPECT_THAT(refused.err, HasSubstr("picture 3 of it shows " + std::to_string(bed().size()) +
+                                     " beads: give --skip 2, which leaves out the pictures before it"));
+  arguments.insert(arguments.end(), {"--skip", "2"});
+  EXPECT_EQ(runner.run(arguments).exit_code, 0);
+  EXPECT_NEAR(runner.beads(), number_of_beads(), 0);
+  arguments.back() = "4";
+  const ProgramResult none = runner.run(arguments);
+  EXPECT_EQ(none.exit_code, 5);
+  EXPECT_THAT(none.err, HasSubstr("stack.tif: no frame is left, because skip leaves out 4 frames at the beginning"));
 }
 
 // A warning that proposes a scale: once it is given, neither the scale nor the diameter is doubted.

@@ -487,7 +487,8 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
     { "stage": "render", "id": "low", "from": "bed", "scale": "0.25 mm/px", "frames": 1, "height": "30 mm" },
     { "stage": "render", "id": "high", "from": "bed", "scale": "0.25 mm/px", "frames": 1, "height": "45 mm" },
     { "stage": "extract", "id": "all", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz" },
-    { "stage": "extract", "id": "second", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz", "stride": 2 } ] })";
+    { "stage": "extract", "id": "second", "from": "render", "diameter": "3 mm", "frame_rate": "1280 Hz", "stride": 2 },
+    { "stage": "extract", "id": "late", "from": "render", "diameter": "3 mm", "skip": 162, "stride": 3 } ] })";
   write_text(folder / "r.json", recipe);
   const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
@@ -513,6 +514,9 @@ TEST(Film, HasTheTemperaturesAndTheShakingOfItsBed) {
     EXPECT_FALSE(extract["frequency_given"]);
   }
   const Json one = read_json(folder / "o/all/extract.json"), two = read_json(folder / "o/second/extract.json");
+  const Json late = read_json(folder / "o/late/extract.json");
+  EXPECT_EQ(late["frames"], 10) << "162, 165, ... 189 of 192";
+  EXPECT_GT(late["truth"]["recall"], 0.99) << "beside the truth of these frames";
   EXPECT_NEAR(value(two["velocities"]["mean_step"]) / value(one["velocities"]["mean_step"]), 2, 0.4);
   EXPECT_DOUBLE_EQ(value(one["velocities"]["frame_rate"]) / value(two["velocities"]["frame_rate"]), 2);
   const auto rows = [&](const char* id) { return value(read_json(folder / "o" / id / "render.json")["height"]); };

@@ -402,12 +402,20 @@ TEST(ProposalsForAPicture, MayBeInALaterOne) {
   const std::string blank = (bed.folder / "blank.pgm").string();
   write_text(blank, PaintedPicture(260, 140).noise(2).pgm());
   const std::string count = std::to_string(bed.places.size());
-  EXPECT_EQ(advice_of_other_pictures({blank, bed.path}, bed.options),
-            "bed.pgm shows " + count + " beads: leave out the picture before it");
-  EXPECT_EQ(advice_of_other_pictures({blank, blank, bed.path}, bed.options),
-            "bed.pgm shows " + count + " beads: leave out the pictures before it");
-  EXPECT_EQ(advice_of_other_pictures({bed.path, blank}, bed.options), "") << "the first was refused";
-  EXPECT_EQ(advice_of_other_pictures({blank, blank, blank, blank, bed.path}, bed.options), "") << "three are tried";
+  const auto advice = [&](const std::vector<std::string>& paths, const ExtractOptions& options) {
+    std::vector<shakebed::ingest::FrameOrigin> pictures;
+    for (const std::string& path : paths) pictures.push_back({path, 0});
+    return advice_of_other_pictures(pictures, options);
+  };
+  EXPECT_EQ(advice({blank, bed.path}, bed.options),
+            "bed.pgm shows " + count + " beads: give --skip 1, which leaves out the picture before it");
+  EXPECT_EQ(advice({blank, blank, bed.path}, bed.options),
+            "bed.pgm shows " + count + " beads: give --skip 2, which leaves out the pictures before it");
+  ExtractOptions every_third = bed.options;
+  every_third.skip = 4, every_third.stride = 3;
+  EXPECT_THAT(advice({blank, blank, bed.path}, every_third), HasSubstr("give --skip 10, ")) << "4 + 2 x 3";
+  EXPECT_EQ(advice({bed.path, blank}, bed.options), "") << "the first was refused";
+  EXPECT_EQ(advice({blank, blank, blank, blank, bed.path}, bed.options), "") << "three are tried";
 }
 
 // --- what is accepted
