@@ -324,16 +324,6 @@ std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, cons
 
 }  // namespace
 
-SearchedFrame::SearchedFrame(GrayFrame frame, int reduction, FindOptions options, CalibrationResult learned)
-    : frame_(std::move(frame)), reduction_(reduction), options_(std::move(options)), learned_(std::move(learned)) {}
-
-std::optional<CalibrationResult> SearchedFrame::take(const GrayFrame& frame, const FindOptions& options) {
-  const bool same = frame.width == frame_.width && options == options_ && frame.pixels == frame_.pixels;
-  frame_ = {};
-  std::optional<CalibrationResult> learned = std::exchange(learned_, std::nullopt);
-  return same ? std::move(learned) : std::nullopt;
-}
-
 SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options) {
   const ChannelTrials trials(frames, best, options);
   const auto first = std::find_if(frames.channels.begin(), frames.channels.end(),

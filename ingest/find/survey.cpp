@@ -614,6 +614,16 @@ Survey survey_of_part(const ChannelFrames& frames, const PicturePart& part, cons
 
 }  // namespace
 
+SearchedFrame::SearchedFrame(GrayFrame frame, int reduction, FindOptions options, CalibrationResult learned)
+    : frame_(std::move(frame)), reduction_(reduction), options_(std::move(options)), learned_(std::move(learned)) {}
+
+std::optional<CalibrationResult> SearchedFrame::take(const GrayFrame& frame, const FindOptions& options) {
+  const bool same = frame.width == frame_.width && options == options_ && frame.pixels == frame_.pixels;
+  frame_ = {};
+  std::optional<CalibrationResult> learned = std::exchange(learned_, std::nullopt);
+  return same ? std::move(learned) : std::nullopt;
+}
+
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   Survey survey = survey_of_all(frames, options, Effort::full);
   if (survey.found || options.roi || frames.channels.empty()) return survey;

@@ -45,6 +45,9 @@ int preview_images(const Call& call, const FitImagesArguments& image) {
   request.options.floor = image.floor;
   request.options.left_wall = image.left_wall, request.options.right_wall = image.right_wall;
   request.options.radius = image.radius;
+  request.options.pixel_aspect = image.pixel_aspect, request.options.lens_radial = image.lens;
+  request.options.bead_number = image.bead_number;
+  request.options.skip = image.skip.value_or(0), request.options.stride = image.stride.value_or(1);
   request.options.polarity = choice_of<BeadPolarity>(image.polarity, polarity_names());
   request.options.shape = choice_of<BeadShape>(image.shape, shape_names());
   request.options.channel = choice_of<BeadChannel>(image.channel, channel_names());

@@ -18,7 +18,7 @@ namespace {
 
 Previewed preview_images(const PreviewRequest& request) {
   ingest::FrameSourceOptions kept;
-  kept.skip = request.options.skip;
+  kept.skip = request.options.skip, kept.stride = request.options.stride;
   const std::vector<ingest::FrameOrigin> pictures = first_pictures(request.files, kept);
   const std::optional<FirstLook> look = look_at_first(pictures, request.options, LookFor::preview);
   if (!look) throw InputError(fmt::format("{}: none of the first pictures can be read", pictures.front().path));
@@ -31,7 +31,8 @@ Previewed preview_images(const PreviewRequest& request) {
   std::vector<Proposal> proposals;
   if (!why.empty()) proposals = proposals_for(*look, request.options, RefusedBy::first_look);
   write_preview(request.folder, *look, request.files, request.options, proposals);
-  if (!why.empty()) return {false, fmt::format("{}: {}. {}", look->path, why, advice_of(proposals, request.options))};
+  if (!why.empty())
+    return {false, fmt::format("{}: {}. {}", look->path, why, advice_for(proposals, pictures, request.options))};
   const ingest::SurveyCandidate& best = look->survey.candidates.front();
   return {true, fmt::format("a first look, without the fit of each bead: about {} {} beads of {:.1f} px radius in "
                             "channel {}; expected share of false beads {:.1f} %. The run may find more",

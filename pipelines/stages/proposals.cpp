@@ -291,11 +291,18 @@ std::string advice_of_other_pictures(const std::vector<ingest::FrameOrigin>& pic
     if (!trial) continue;
     const bool same_file = pictures[k].path == pictures.front().path;
     return fmt::format("{} shows {} beads: give --skip {}, which leaves out the picture{} before it",
-                       same_file ? fmt::format("picture {} of it", 1 + pictures[k].page)
+                       same_file ? fmt::format("Picture {} of it", 1 + pictures[k].page)
                                  : std::filesystem::path(pictures[k].path).filename().string(),
                        trial->beads, options.skip + k * options.stride, k == 1 ? "" : "s");
   }
   return "";
+}
+
+std::string advice_for(const std::vector<Proposal>& proposals, const std::vector<ingest::FrameOrigin>& pictures,
+                       const ExtractOptions& options) {
+  if (proposals.empty())
+    if (std::string others = advice_of_other_pictures(pictures, options); !others.empty()) return others;
+  return advice_of(proposals, options);
 }
 
 }  // namespace shakebed::pipelines

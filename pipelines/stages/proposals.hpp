@@ -22,5 +22,8 @@ std::string advice_of(const std::vector<Proposal>& proposals, const ExtractOptio
 
 // Of several pictures, the first that shows beads after those that do not: a sentence, empty where none does.
 std::string advice_of_other_pictures(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options);
+// That of the proposals; where there are none, that of the other pictures, if it helps.
+std::string advice_for(const std::vector<Proposal>& proposals, const std::vector<ingest::FrameOrigin>& pictures,
+                       const ExtractOptions& options);
 
 }  // namespace shakebed::pipelines

@@ -358,9 +358,16 @@ TEST(FollowedAdvice, OnAStackThatBeginsWithoutBeadsIsToSkipItsFirstPictures) {
   Words arguments{"fit-images", "stack.tif", "--diameter", "3 mm"};
   const ProgramResult refused = runner.run(arguments);
   ASSERT_EQ(refused.exit_code, 5);
-  EXPECT_THAT(refused.err, HasSubstr("picture 3 of it shows " + std::to_string(bed().size()) +
+  EXPECT_THAT(refused.err, HasSubstr("Picture 3 of it shows " + std::to_string(bed().size()) +
                                      " beads: give --skip 2, which leaves out the pictures before it"));
+  Words preview = arguments;
+  preview.emplace_back("--preview");
+  const ProgramResult seen = runner.run(preview);
+  EXPECT_EQ(seen.exit_code, 5);
+  EXPECT_THAT(seen.err, HasSubstr("give --skip 2, which"));
   arguments.insert(arguments.end(), {"--skip", "2"});
+  preview.insert(preview.end(), {"--skip", "2"});
+  EXPECT_EQ(runner.run(preview).exit_code, 0);
   EXPECT_EQ(runner.run(arguments).exit_code, 0);
   EXPECT_NEAR(runner.beads(), number_of_beads(), 0);
   arguments.back() = "4";
