@@ -112,14 +112,19 @@ ingest::SurveyOptions survey_asked_for(const ExtractOptions& options) {
 
 std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& files,
                                                 const ingest::FrameSourceOptions& source) {
-  std::vector<ingest::FrameOrigin> pictures =
-      ingest::FrameSource::open(files, source).first_origins(ingest::most_tried);
-  if (pictures.empty())
+  const auto pictures_of = [&](const ingest::FrameSourceOptions& options) {
+    return ingest::FrameSource::open(files, options).first_origins(ingest::most_tried);
+  };
+  std::vector<ingest::FrameOrigin> pictures = pictures_of(source);
+  if (!pictures.empty()) return pictures;
+  ingest::FrameSourceOptions all = source;
+  all.skip = 0;
+  if (source.skip > 0 && !pictures_of(all).empty())
     throw StageError(
         fmt::format("{}: no frame is left, because skip leaves out {} frames at the beginning. Give a "
                     "smaller number",
                     files.front(), source.skip));
-  return pictures;
+  return {{files.front(), 0}};
 }
 
 std::optional<FirstLook> look_at_first(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options,

@@ -25,7 +25,8 @@ inline ingest::Channel channel_of(BeadChannel channel) {
 // What the options ask of a survey.
 ingest::SurveyOptions survey_asked_for(const ExtractOptions& options);
 
-// The first frames, at most as many as a first look tries. Throws StageError where `skip` leaves none.
+// The first frames, at most as many as a first look tries; the first file where no frame of it can be read. Throws
+// StageError where `skip` leaves none.
 std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& files,
                                                 const ingest::FrameSourceOptions& source);
 

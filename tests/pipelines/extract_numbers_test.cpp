@@ -387,6 +387,27 @@ TEST(BeadNumber, IsHeldAgainstTheBeadsFound) {
   }
 }
 
+// What cannot be read is named later, by whoever reads it; only `skip` can leave out all frames.
+TEST(FirstPictures, AreThoseAfterTheSkippedOnes) {
+  const std::filesystem::path folder = testing::TempDir();
+  const std::string one = (folder / "one.pgm").string(), two = (folder / "two.pgm").string();
+  const std::string damaged = (folder / "damaged.mp4").string();
+  for (const std::string& path : {one, two}) write_text(path, PaintedPicture(20, 10).pgm());
+  write_text(damaged, std::string(1'000, 'x'));
+  const auto first = [](const std::vector<std::string>& files, std::size_t skip) {
+    shakebed::ingest::FrameSourceOptions source;
+    source.skip = skip;
+    std::vector<std::string> paths;
+    for (const auto& picture : first_pictures(files, source)) paths.push_back(picture.path);
+    return paths;
+  };
+  using Paths = std::vector<std::string>;
+  EXPECT_EQ(first({one, two}, 0), (Paths{one, two}));
+  EXPECT_EQ(first({one, two}, 1), (Paths{two}));
+  EXPECT_THROW(first({one, two}, 2), StageError);
+  EXPECT_EQ(first({damaged}, 0), (Paths{damaged}));
+}
+
 // Large beads are tried on a reduced copy: as many, and as large, as in the picture itself.
 TEST(PictureTrial, OnAReducedPictureFindsTheSameBeads) {
   constexpr double radius = 25;
