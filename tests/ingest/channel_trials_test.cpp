@@ -62,6 +62,14 @@ TEST(ChannelTrials, OfAReducedFrameLookWhereItsBeadsAre) {
   EXPECT_EQ(settled.disks.size(), 15U) << "those of the survey";
 }
 
+// At four times the columns, 70 and 154, there is nothing: a channel has no contrast there.
+TEST(ChannelTrials, OfAReducedFrameMeasureTheContrastOnItsBeads) {
+  std::vector<RenderedDisk> in_green;
+  for (const double column : {17.0, 38.0, 115.0})
+    for (int row = 0; row < 4; ++row) in_green.push_back({column, 17 + 28.0 * row, 9, 0, 0});
+  EXPECT_EQ(TrialFrames({in_green.begin(), in_green.begin() + 8}, in_green, 230, 4).settled().channel, Channel::green);
+}
+
 // In the upper half both channels show the same ten beads.
 TEST(ChannelTrials, CountBeadsInTheRegionAlone) {
   const std::vector<RenderedDisk> all = beads_of_trial();

@@ -179,7 +179,12 @@ TEST(PictureScript, NeedsSomethingToDraw) {
 // empty groups, of which the first keeps that of the picture before. A script that cannot be drawn is named.
 TEST(Drawings, AreThoseDrawnAlone) {
   const ScratchFolder folder;
-  const Picture one{.x_label = "x", .y_label = "y", .series = {{"a", Style::line, 1, {0, 1}, {0, 1}, {}}}, .x_high = 3};
+  const Picture one{.x_label = "x",
+                    .y_label = "y",
+                    .title = "a title",
+                    .series = {{"a", Style::line, 1, {1, 2}, {1, 100}, {}}},
+                    .bands = {{1.2, 1.5}},
+                    .logarithmic_y = true};
   const Picture two{.x_label = "u", .y_label = "v", .series = {{"b", Style::points, 2, {1, 9}, {2, 5}, {}}}};
   Drawings both(folder.path());
   both.add(one, "one");
