@@ -142,7 +142,7 @@ TEST_F(ImageFaults, DamagedFramesAreNamed) {
     // The other five are enough for a profile; the report counts what is missing.
     EXPECT_EQ(result.exit_code, 0) << damage << ": " << result.err;
     EXPECT_NE(result.err.find("warning: extract: 1 of 6 frames could not be used"), std::string::npos) << result.err;
-    EXPECT_NE(result.err.find("000003.png"), std::string::npos) << damage << ": " << result.err;
+    EXPECT_NE(result.err.find("frame 3 (000003.png): "), std::string::npos) << damage << ": " << result.err;
   };
   const auto afresh = [&] {
     fs::remove_all(folder_ / "frames");
