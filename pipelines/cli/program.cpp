@@ -85,6 +85,19 @@ void Program::refuse_unknown_option() const {
   }
 }
 
+namespace {
+// CLI11 2.1 reads -1 as the largest unsigned number.
+void refuse_negative_counts(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_type_name() != "UINT") continue;
+    option->check([](const std::string& given) {
+      return given.starts_with('-') ? fmt::format("must not be negative, got {}", given) : std::string();
+    });
+  }
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) refuse_negative_counts(*command);
+}
+}  // namespace
+
 int Program::run() {
   // For the install rules: manual pages and completions.
   if (argc_ == 3 && std::string_view(argv_[1]) == "--write-command-pages") {
@@ -92,6 +105,7 @@ int Program::run() {
     return exit_ok;
   }
   refuse_unknown_command();
+  refuse_negative_counts(app_);
   try {
     app_.parse(argc_, argv_);
   } catch (const CLI::ParseError& error) {

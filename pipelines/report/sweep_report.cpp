@@ -192,7 +192,7 @@ class SweepFigures {
       drawings.add(picture, name);
       figures.push_back(folder / (name + ".svg"));
     }
-    if (!figures.empty()) drawings.draw();
+    drawings.draw();
     return figures;
   }
 

@@ -320,7 +320,8 @@ class PlanBuilder {
     planned.stage = draft.row->make();
     Fields::Source source = source_;
     source.input_files = &planned.input_files;
-    source.problems_before = problems_.size();
+    const std::size_t problems_before = problems_.size();
+    source.problems_before = problems_before;
     for (const std::size_t k : draft.arrows) {
       planned.from.push_back(position_[k]);
       const PlannedStage& before = plan_.stages[position_[k]];
@@ -329,7 +330,6 @@ class PlanBuilder {
       if (!planned.bed) planned.bed = before.bed;
     }
     if (planned.bed) source.bed = &*planned.bed;
-    const std::size_t problems_before = problems_.size();
     CommonOptions common;
     common.id = draft.id;
     Fields fields = Fields::decode(*draft.node, planned.pointer, source);

@@ -36,13 +36,13 @@ namespace fs = std::filesystem;
 // Where the pictures of a refusal stay: beside the folders of the stages, since this stage leaves none.
 fs::path refusal_folder(const RunContext& context) { return context.output_directory().parent_path() / "no-beads"; }
 
-// What was tried on the picture, with the page that shows it: two sentences.
+// What was tried on the picture, or on those after it, with the page that shows it.
 std::string advice(const ExtractOptions& options, RunContext& context, const FirstLook& look,
-                   const std::vector<Proposal>& proposals) {
+                   const std::vector<Proposal>& proposals, const std::vector<ingest::FrameOrigin>& pictures = {}) {
   const fs::path folder = refusal_folder(context);
   fs::create_directories(folder);
   write_preview(folder, look, options.images.texts, options, proposals);
-  return fmt::format("See {}. {}", (folder / "preview.html").string(), advice_of(proposals, options));
+  return fmt::format("See {}. {}", (folder / "preview.html").string(), advice_for(proposals, pictures, options));
 }
 
 // Says what the first frame shows instead of beads, or instead of those described.
@@ -50,11 +50,7 @@ std::string advice(const ExtractOptions& options, RunContext& context, const Fir
                          const std::vector<ingest::FrameOrigin>& pictures, const std::string& why) {
   context.progress(0, "trying other options");
   const std::vector<Proposal> proposals = proposals_for(look, options, RefusedBy::first_look);
-  const std::string what = fmt::format("{}: {}", look.path, why);
-  if (proposals.empty())
-    if (const std::string others = advice_of_other_pictures(pictures, options); !others.empty())
-      throw StageError(fmt::format("{}. {}", what, others));
-  throw StageError(fmt::format("{}. {}", what, advice(options, context, look, proposals)));
+  throw StageError(fmt::format("{}: {}. {}", look.path, why, advice(options, context, look, proposals, pictures)));
 }
 
 // Throws StageError where frames reduced so far show too little of a bead.
@@ -74,9 +70,9 @@ struct UsedLook {
   std::optional<FirstLook> look;  // without its picture; none where no file can be read
   bool round = true;
 };
-UsedLook use_first_look(const ExtractOptions& options, RunContext& context, FilmFiles& film,
+UsedLook use_first_look(const ExtractOptions& options, RunContext& context,
+                        const std::vector<ingest::FrameOrigin>& pictures, FilmFiles& film,
                         ingest::MeasureOptions& measure) {
-  const std::vector<ingest::FrameOrigin> pictures = first_pictures(film.paths, film.source);
   std::optional<FirstLook> look = look_at_first(pictures, options, LookFor::search);
   std::error_code error;
   fs::remove_all(refusal_folder(context), error);
@@ -155,8 +151,9 @@ class Extraction {
       first_pictures(film_.paths, film_.source);  // refuses where none is left
     } else {
       film_.paths = named_pictures(options_.images);
-      read_sides();
-      first_look_ = use_first_look(options_, context_, film_, measure_);
+      const std::vector<ingest::FrameOrigin> pictures = first_pictures(film_.paths, film_.source);
+      read_sides(pictures.front().path);
+      first_look_ = use_first_look(options_, context_, pictures, film_, measure_);
     }
     if (options_.reduction) film_.source.reduction = measure_.reduction = static_cast<int>(*options_.reduction);
     std::optional<std::ifstream> truth_file;
@@ -218,10 +215,9 @@ class Extraction {
   }
 
   // Pictures of a simulated bed with periodic sides say so.
-  void read_sides() {
+  void read_sides(const std::string& first) {
     if (measure_.left_wall_px || measure_.find.roi) return;
-    const auto first = first_pictures(film_.paths, film_.source);
-    const auto said = ingest::png_text(first.front().path, FrameGeometry::keyword);
+    const auto said = ingest::png_text(first, FrameGeometry::keyword);
     const auto geometry = said ? FrameGeometry::from_sides_text(said->text) : std::nullopt;
     if (!geometry) return;
     if (geometry->width != said->width || geometry->height != said->height) {
@@ -229,14 +225,14 @@ class Extraction {
           fmt::format("{}: this is a simulated bed with periodic sides, in a picture that was cut or scaled, so the "
                       "positions of the sides are unknown. The width found may be up to 1 D too large, and the density "
                       "too low by the same factor. Give the sides (--left-wall, --right-wall)",
-                      first.front().path));
+                      first));
       return;
     }
     use_periodic_sides(*geometry);
     context_.warning(
         fmt::format("{}: this is a simulated bed with periodic sides. The width used is that of its box, from column "
                     "{:g} to {:g}, as stated in the file. Beads that extend beyond it are counted",
-                    first.front().path, geometry->left_wall, geometry->right_wall));
+                    first, geometry->left_wall, geometry->right_wall));
   }
 
   ingest::Measurement measure(DisksOnTheWay& on_the_way) {

@@ -138,6 +138,7 @@ void Drawings::add_script(const std::string& name, const std::string& script) {
 }
 
 void Drawings::draw() const {
+  if (names_.empty()) return;
   std::vector<std::string> command{"env", "SOURCE_DATE_EPOCH=0", "gnuplot"};
   for (const std::string& name : names_) {
     if (name != names_.front()) command.insert(command.end(), {"-e", "reset session"});

@@ -56,7 +56,7 @@ class Drawings {
   void add(const DiskPicture& picture, const std::string& name);
   void add(const MapPicture& picture);
   void add_script(const std::string& name, const std::string& script);
-  // Throws StageError when gnuplot is missing or fails.
+  // Throws StageError when gnuplot is missing or fails. Of no pictures it does nothing.
   void draw() const;
 
  private:

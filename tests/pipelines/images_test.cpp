@@ -562,6 +562,9 @@ TEST(FrameBudget, ChoosesHowManyFramesAreMeasured) {
   EXPECT_THAT(all.err, HasSubstr("all 48 frames together leave a statistical error of T of about"));
   EXPECT_EQ(read_json(folder / "some/extract/extract.json")["frames"], measured) << "nothing ran";
 
+  EXPECT_THAT(fit("some", {"--budget", "6 %", "--skip", "40", "--dry-run"}).err,
+              HasSubstr("--budget \"6 %\": all 8 frames are measured"));
+
   // Of no more frames than a pilot's all are measured, each.
   const std::string first = std::filesystem::directory_iterator(folder / "o/render/frames")->path().string();
   const ProgramResult one =

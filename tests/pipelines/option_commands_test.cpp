@@ -152,6 +152,8 @@ TEST_F(ImageCommands, NameTheirOptions) {
             "--kernel: expected gaussian:WIDTH, top_hat:WIDTH or disk_chord:WIDTH (in D), got \"none\"");
   EXPECT_THAT(refused(with({"--bead-number", "0"}), 3),
               testing::StartsWith("--bead-number: must be 1 or more, got 0."));
+  EXPECT_EQ(refused(with({"--bead-number=-1"})), "--bead-number: must not be negative, got -1; see --help");
+  EXPECT_EQ(refused(with({"--skip=-2"})), "--skip: must not be negative, got -2; see --help");
   EXPECT_EQ(refused(with({"--roi", "1,2,0,4"}), 3), "--roi: width and height must be at least 8 pixels");
   EXPECT_EQ(refused(with({"--plateau-density", "1.1548"})),
             "--plateau-density: must be above 0 and at most 1.1547005383792515 (close packing), got 1.1548");
