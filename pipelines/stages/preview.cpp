@@ -119,7 +119,8 @@ std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& 
   if (!pictures.empty()) return pictures;
   ingest::FrameSourceOptions all = source;
   all.skip = 0;
-  if (source.skip > 0 && !pictures_of(all).empty())
+  // A film that cannot be opened has no frame at all, and says so here.
+  if (source.skip > 0 && ingest::FrameSource::open(files, all).next())
     throw StageError(
         fmt::format("{}: no frame is left, because skip leaves out {} frames at the beginning. Give a "
                     "smaller number",

@@ -406,6 +406,7 @@ TEST(FirstPictures, AreThoseAfterTheSkippedOnes) {
   EXPECT_EQ(first({one, two}, 1), (Paths{two}));
   EXPECT_THROW(first({one, two}, 2), StageError);
   EXPECT_EQ(first({damaged}, 0), (Paths{damaged}));
+  EXPECT_THROW(first({damaged}, 2), shakebed::ingest::InputError) << "it has no frame at all";
 }
 
 // Large beads are tried on a reduced copy: as many, and as large, as in the picture itself.
