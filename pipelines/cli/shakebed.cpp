@@ -1,10 +1,14 @@
 // The program: its commands, in the order of --help.
+#include <cstdlib>
+
 #include "pipelines/cli/commands.hpp"
 #include "pipelines/cli/exit_code.hpp"
 #include "pipelines/cli/program.hpp"
 
 int main(int argc, char** argv) {
   using namespace shakebed::pipelines;
+  // The decoders of films write lines of their own about a damaged file. The program names the file and says what to do.
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   return exit_code_of([&] {
     Program program(argc, argv);
     for (const auto add :

@@ -327,6 +327,7 @@ TEST(Safety, FilmsThatClaimToBeHugeAreRefused) {
         within(3ull << 30, {"fit-images", name, "--diameter", "3 mm", "--out", "o"}, folder.path());
     EXPECT_EQ(result.exit_code, 4) << name << " " << result.err;
     EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find("[mov"), std::string::npos) << "the decoder's own lines: " << result.err;
   }
 }
 
