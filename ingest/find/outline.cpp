@@ -50,6 +50,9 @@ constexpr double most_not_round = 0.4;  // beads seen 2.6 px in radius, enlarged
 // Outlines on each side of a cut, at least; and the chance that shapes without a place give such a cut.
 constexpr std::size_t fewest_on_a_side = 8;
 constexpr double cut_by_chance = 1e-4;
+// Share of the outlines beyond a cut that are not round, where other things than beads lie there: of drawn squares 1.
+// Of beads whose faces show stress, of which some look round, 0.7.
+constexpr double least_not_round_beyond = 0.9;
 
 constexpr std::size_t outline_terms = 1 + 2 * highest_harmonic;
 
@@ -411,13 +414,14 @@ bool on_side(const OneOutline& one, const SideOfCut& side) {
   return ((side.left_or_right ? one.x : one.y) > side.at) == side.beyond;
 }
 
-// A cut with round outlines on one side alone.
+// A cut with round outlines on one side, and on the other hardly any.
 std::optional<SideOfCut> round_side_of(const std::vector<OneOutline>& outlines) {
   const std::optional<SideOfCut> side = best_cut(outlines);
   if (!side) return std::nullopt;
   std::vector<OneOutline> here, there;
   for (const OneOutline& one : outlines) (on_side(one, *side) ? here : there).push_back(one);
-  if (!summary_of(here).round() || summary_of(there).round()) return std::nullopt;
+  const Roundness beyond = summary_of(there);
+  if (!summary_of(here).round() || beyond.round() || beyond.not_round < least_not_round_beyond) return std::nullopt;
   return side;
 }
 
