@@ -277,7 +277,22 @@ TEST(TimeLeft, CountsFromWhereAPartIsTakenUp) {
   EXPECT_NEAR(*time.seconds(), 20 / 0.4, 1e-12);
 }
 
-// In its first second, too: half a second of four.
+// After a part of 10 s the second one, taken up at 0.6, needs 10 s for 0.2. By itself it has 10 s left. At the pace of
+// both, 20 s for 1.2 parts, it has a third of that. Its 0.2 done count as twice the 0.1 at which both count alike.
+TEST(TimeLeft, TrustsAPartByWhatItHasDoneSinceItWasTakenUp) {
+  double now = 0;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.begin(0);
+  now = 10;
+  time.end(0);
+  time.begin(1);
+  time.reached(1, 0.6);
+  now = 20;
+  time.reached(1, 0.8);
+  EXPECT_NEAR(*time.seconds(), (2 * 10 + 20 / 1.2 * 0.2) / 3, 1e-12);
+}
+
+// In its first second, too: half a second of four. Where nothing is known of its parts, it has none.
 TEST(TimeLeft, HasAFractionFromItsBeginningOn) {
   double now = 10;
   TimeLeft time(2, 1, [&] { return now; });
@@ -287,6 +302,10 @@ TEST(TimeLeft, HasAFractionFromItsBeginningOn) {
   EXPECT_EQ(time.fraction(), 0);
   now = 10.5;
   EXPECT_NEAR(time.fraction(), 0.5 / 4, 1e-12);
+  TimeLeft unknown(1, 1, [&] { return now; });
+  now = 20;
+  ASSERT_FALSE(unknown.seconds());
+  EXPECT_EQ(unknown.fraction(), 0);
 }
 
 }  // namespace
