@@ -114,12 +114,13 @@ std::string DisksOnTheWay::quality_figure() const {
         left + step * static_cast<double>(k), top + high - tall, step - 1, tall, quality_[k]);
   }
   return fmt::format(
-             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 640 270\" width=\"640\" height=\"270\" "
+             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 640 290\" width=\"640\" height=\"290\" "
              "font-family=\"sans-serif\" font-size=\"13\">\n<rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\" "
              "fill=\"none\" stroke=\"#888\"/>\n<text x=\"{0}\" y=\"{4}\">0</text>\n<text x=\"{5}\" y=\"{4}\" "
              "text-anchor=\"end\">1</text>\n<text x=\"{6}\" y=\"{7}\" text-anchor=\"middle\">quality of the disks: 1 "
-             "for a bead that looks like the others (height of a bar: logarithm of the number of disks)</text>\n",
-             left, top, wide, high, top + high + 20, left + wide, left + wide / 2, top + high + 42) +
+             "for a bead that looks like the others</text>\n<text x=\"{6}\" y=\"{8}\" text-anchor=\"middle\">"
+             "(height of a bar: logarithm of the number of disks)</text>\n",
+             left, top, wide, high, top + high + 20, left + wide, left + wide / 2, top + high + 42, top + high + 60) +
          bars + "</svg>\n";
 }
 
