@@ -25,8 +25,8 @@ std::vector<std::string> cells_of_row(const std::string& line) {
   return cells;
 }
 
-// Rows of "| T | +bias ± scatter | ..." in per cent, to 0.1 %. A dash: the thermometer has no weight, by a scatter
-// of 2.
+// Rows of "| T | +bias ± scatter | ... | misfit |" in per cent, to 0.1 %. A dash: the thermometer has no weight, by a
+// scatter of 2.
 TEST(KnownBiases, AreThoseOfTheManual) {
   std::ifstream manual(SHAKEBED_THERMOMETER_PAGE);
   ASSERT_TRUE(manual);
@@ -37,10 +37,11 @@ TEST(KnownBiases, AreThoseOfTheManual) {
   std::size_t row = 0, compared = 0;
   for (; std::getline(manual, line) && !line.empty(); ++row) {
     const std::vector<std::string> cells = cells_of_row(line);
-    ASSERT_EQ(cells.size(), 1 + thermometer_count) << line;
+    ASSERT_EQ(cells.size(), 2 + thermometer_count) << line;
     ASSERT_LT(row, known_biases().size());
     const KnownBiases& known = known_biases()[row];
     EXPECT_NEAR(std::stod(cells[0]), known.temperature, 1e-12) << line;
+    EXPECT_NEAR(std::stod(cells.back()), known.misfit, 1e-12) << line;
     for (std::size_t t = 0; t < thermometer_count; ++t) {
       double mean = 0, scatter = 0;
       if (cells[t + 1] == " \u2013 ") {
