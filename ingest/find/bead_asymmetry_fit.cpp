@@ -31,7 +31,8 @@ class HarmonicSums {
       : reach_(reach),
         rings_(static_cast<std::size_t>(std::ceil(reach / ring_px)) + 1),
         sums_(rings_),
-        weight_(rings_, 0.0) {
+        weight_(rings_, 0.0),
+        row_(static_cast<std::size_t>(2 * reach) + 2) {
     for (Ring& ring : sums_) ring.fill(0);
   }
   [[nodiscard]] std::size_t rings() const { return rings_; }
@@ -43,10 +44,7 @@ class HarmonicSums {
       const double dy = row - bead.y, half = std::sqrt(std::max(0.0, reach_ * reach_ - dy * dy));
       const int left = std::max(0, static_cast<int>(std::ceil(bead.x - half)));
       const int right = std::min(fit.width() - 1, static_cast<int>(std::floor(bead.x + half)));
-      const float* line = fit.residual_row(row);
-      for (int column = left; column <= right; ++column)
-        if (std::abs(line[column]) <= least_foreign_residual)
-          add_pixel(column - bead.x, dy, static_cast<double>(line[column]));
+      add_row(fit.residual_row(row), left, right, bead.x, dy);
     }
   }
 
@@ -62,10 +60,27 @@ class HarmonicSums {
   }
 
  private:
-  void add_pixel(double dx, double dy, double e) {
-    const double r = std::sqrt(dx * dx + dy * dy);
-    if (r < 1e-6) return;
-    const double place = r / ring_px, cosine = dx / r, sine = dy / r;
+  // Where a pixel lies: its distance, in px and in rings, and its direction.
+  struct Row {
+    explicit Row(std::size_t longest) : r(longest), place(longest), cosine(longest), sine(longest) {}
+    std::vector<double> r, place, cosine, sine;
+  };
+
+  // Roots and quotients of all pixels first, many at once.
+  void add_row(const float* line, int left, int right, double x, double dy) {
+    double *r = row_.r.data(), *place = row_.place.data(), *cosine = row_.cosine.data(), *sine = row_.sine.data();
+    const int count = right - left + 1;
+    for (int k = 0; k < count; ++k) {
+      const double dx = left + k - x;
+      r[k] = std::sqrt(dx * dx + dy * dy);
+      place[k] = r[k] / ring_px, cosine[k] = dx / r[k], sine[k] = dy / r[k];
+    }
+    for (int k = 0; k < count; ++k)
+      if (std::abs(line[left + k]) <= least_foreign_residual && r[k] >= 1e-6)
+        add_pixel(place[k], cosine[k], sine[k], static_cast<double>(line[left + k]));
+  }
+
+  void add_pixel(double place, double cosine, double sine, double e) {
     const auto k = std::min(rings_ - 2, static_cast<std::size_t>(place));
     const double outer = place - static_cast<double>(k);
     Ring harmonic;
@@ -91,6 +106,7 @@ class HarmonicSums {
   std::size_t rings_;
   std::vector<Ring> sums_;
   std::vector<double> weight_;
+  Row row_;
 };
 
 }  // namespace

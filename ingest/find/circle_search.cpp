@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <numbers>
 #include <utility>
 
@@ -36,11 +37,21 @@ Direction direction_of(int k, int count) {
   return table[static_cast<std::size_t>(k) * directions_in_table / static_cast<std::size_t>(count)];
 }
 
+constexpr int most_directions = 64;  // Circle::met has a bit each
+
+// `count` directions about a circle. Quotients are slow: once for all rounds of a fit.
+struct Directions {
+  int count;
+  std::array<Direction, most_directions> of;
+  explicit Directions(int how_many) : count(how_many) {
+    for (int k = 0; k < count; ++k) of[static_cast<std::size_t>(k)] = direction_of(k, count);
+  }
+};
+
 // Of the step outwards across a rim; 0: of either sign.
 float sign_of(Polarity polarity) {
   return polarity == Polarity::bright_beads ? -1.0F : polarity == Polarity::dark_beads ? 1.0F : 0.0F;
 }
-float signed_by(float sign, float step) { return sign == 0 ? std::abs(step) : sign * step; }
 
 // Where along a ray the edge is: its distance from the rim, if there is one.
 struct Met {
@@ -48,7 +59,6 @@ struct Met {
   double offset = 0;  // px outwards
   float slope = 0;    // grey levels per px
 };
-constexpr int most_directions = 64;  // Circle::met has a bit each
 using MetAround = std::array<Met, most_directions>;
 
 // Interpolated between pixels, `at` the upper left one.
@@ -56,7 +66,7 @@ inline __attribute__((always_inline)) Floats between(const std::vector<float>& m
                                                      const Floats& right, const Floats& down) {
   const float *upper = map.data(), *lower = upper + width;
   Floats a, b, c, d;
-  gather(upper, at, a), gather(upper + 1, at, b), gather(lower, at, c), gather(lower + 1, at, d);
+  gather_with_next(upper, at, a, b), gather_with_next(lower, at, c, d);
   return (1 - down) * ((1 - right) * a + right * b) + down * ((1 - right) * c + right * d);
 }
 
@@ -66,9 +76,11 @@ struct EightRays {
   Floats slope{}, before{}, after{};  // of the edge, and of the gradients along the ray beside it; grey levels per px
   Ints step{}, in_view{};             // of the edge from the rim; whether the rim is in the picture
 
+  // `whole`: all of every ray is in the picture.
+  template <bool whole>
   void look(const EdgeMap& edges, float sign, int reach) {
     constexpr float least = static_cast<float>(least_alignment * least_alignment);
-    // As signed_by(): of either sign, the larger of both.
+    // Of either sign, the larger of both.
     const float one = sign == 0 ? 1.0F : sign, other = sign == 0 ? -1.0F : sign;
     const float right_end = static_cast<float>(edges.width - 2), lower_end = static_cast<float>(edges.height - 2);
     slope = slope + edges.threshold;
@@ -76,18 +88,18 @@ struct EightRays {
     Floats last = {};
     for (int k = -reach; k <= reach; ++k) {
       const float distance = static_cast<float>(k) * static_cast<float>(ray_step);
-      const Floats px = x + distance * cosine, py = y + distance * sine;
+      const Floats px = x + distance * cosine, py = y + distance * sine, nothing = {};
       const Ints inside = (px >= 1) & (py >= 1) & (px < right_end) & (py < lower_end);
-      const Floats safe_x = inside ? px : last * 0, safe_y = inside ? py : last * 0;
+      const Floats safe_x = whole ? px : inside ? px : nothing, safe_y = whole ? py : inside ? py : nothing;
       const Ints column = __builtin_convertvector(safe_x, Ints), row = __builtin_convertvector(safe_y, Ints);
       const Floats right = safe_x - __builtin_convertvector(column, Floats),
                    down = safe_y - __builtin_convertvector(row, Floats);
       const Ints at = row * edges.width + column;
       const Floats dx = between(edges.x, edges.width, at, right, down),
                    dy = between(edges.y, edges.width, at, right, down);
-      const Floats outwards = dx * cosine + dy * sine, nothing = {};
+      const Floats outwards = dx * cosine + dy * sine;
       const Floats either = one * outwards > other * outwards ? one * outwards : other * outwards;
-      const Floats radial = inside ? either : nothing;
+      const Floats radial = whole ? either : inside ? either : nothing;
       const Floats aligned = radial * radial < least * (dx * dx + dy * dy) ? nothing : radial;
       after = step == k - 1 ? radial : after;
       const Ints better = aligned > slope;
@@ -115,18 +127,25 @@ struct EightRays {
   }
 };
 
-// In `count` directions from the centre of a circle, a multiple of eight.
-void look_around(const EdgeMap& edges, const Circle& circle, int count, float sign, double reach, MetAround& met) {
+// In directions from the centre of a circle, a multiple of eight.
+void look_around(const EdgeMap& edges, const Circle& circle, const Directions& directions, float sign, double reach,
+                 MetAround& met) {
   const int steps = std::min(static_cast<int>(std::ceil(reach / ray_step)), most_ray_steps);
-  for (int first = 0; first < count; first += lanes) {
+  const double farthest = circle.radius + ray_step * steps + 1;  // more than a float's rounding
+  const bool whole = circle.x - farthest >= 1 && circle.y - farthest >= 1 && circle.x + farthest < edges.width - 2 &&
+                     circle.y + farthest < edges.height - 2;
+  for (int first = 0; first < directions.count; first += lanes) {
     EightRays rays;
     for (int l = 0; l < lanes; ++l) {
-      const auto [cosine, sine] = direction_of(first + l, count);
+      const auto [cosine, sine] = directions.of[static_cast<std::size_t>(first + l)];
       rays.x[l] = static_cast<float>(circle.x + circle.radius * cosine);
       rays.y[l] = static_cast<float>(circle.y + circle.radius * sine);
       rays.cosine[l] = static_cast<float>(cosine), rays.sine[l] = static_cast<float>(sine);
     }
-    rays.look(edges, sign, steps);
+    if (whole)
+      rays.look<true>(edges, sign, steps);
+    else
+      rays.look<false>(edges, sign, steps);
     for (int l = 0; l < lanes; ++l) met[static_cast<std::size_t>(first + l)] = rays.met(l, steps);
   }
 }
@@ -178,29 +197,54 @@ CircleStep step_towards(const std::vector<MetEdge>& met, int rays) {
   return step;
 }
 
+// Directions of a quick look.
+constexpr std::size_t looks = 16;
+struct LookDirections {
+  std::array<double, looks> cosine{}, sine{};
+  LookDirections() {
+    const Directions directions(looks);
+    for (std::size_t k = 0; k < looks; ++k) cosine[k] = directions.of[k].cosine, sine[k] = directions.of[k].sine;
+  }
+};
+
+// Pixels nearest to the places `along` px from `middle` in eight of the directions, whose cosines or sines are given.
+inline __attribute__((always_inline)) Ints pixels_at(double middle, double along, const double* directions) {
+  typedef double FourDoubles __attribute__((vector_size(32)));
+  typedef int FourInts __attribute__((vector_size(16)));
+  FourDoubles first, second;
+  std::memcpy(&first, directions, sizeof first), std::memcpy(&second, directions + 4, sizeof second);
+  const FourInts one = __builtin_convertvector(middle + along * first + 0.5, FourInts),
+                 other = __builtin_convertvector(middle + along * second + 0.5, FourInts);
+  return __builtin_shufflevector(one, other, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
 // A quick look: enough of the pixels near the rim have a gradient along the radius.
 bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, double reach) {
-  constexpr int looks = 16, fewest_met = 6;
-  int in_view = 0, met = 0;
-  for (int k = 0; k < looks; ++k) {
-    const auto [cosine, sine] = direction_of(k, looks);
-    bool seen = false, edge = false;
+  static const LookDirections directions;
+  constexpr int fewest_met = 6;
+  const float one = sign == 0 ? 1.0F : sign, other = sign == 0 ? -1.0F : sign;  // as in EightRays
+  Ints all_seen = {}, all_met = {};                                             // -1 for each
+  for (std::size_t first = 0; first < looks; first += lanes) {
+    const double *cosines = directions.cosine.data() + first, *sines = directions.sine.data() + first;
+    Floats cosine, sine;
+    for (int l = 0; l < lanes; ++l) cosine[l] = static_cast<float>(cosines[l]), sine[l] = static_cast<float>(sines[l]);
+    Ints seen = {}, edge = {};
     for (double off = -reach; off <= reach + 1e-9; off += reach / std::ceil(reach)) {
-      const int column = static_cast<int>(circle.x + (circle.radius + off) * cosine + 0.5);
-      const int row = static_cast<int>(circle.y + (circle.radius + off) * sine + 0.5);
-      if (column < 1 || row < 1 || column >= edges.width - 1 || row >= edges.height - 1) continue;
-      seen = true;
-      const std::size_t at = edges.at(column, row);
-      const float radial =
-          signed_by(sign, edges.x[at] * static_cast<float>(cosine) + edges.y[at] * static_cast<float>(sine));
-      edge = edge || (radial > edges.threshold &&
-                      radial * radial > 0.6F * (edges.x[at] * edges.x[at] + edges.y[at] * edges.y[at]));
-      if (edge) break;
+      const Ints column = pixels_at(circle.x, circle.radius + off, cosines),
+                 row = pixels_at(circle.y, circle.radius + off, sines);
+      const Ints inside = (column >= 1) & (row >= 1) & (column < edges.width - 1) & (row < edges.height - 1);
+      const Ints at = inside & (row * edges.width + column);
+      Floats dx, dy;
+      ingest::gather(edges.x.data(), at, dx), ingest::gather(edges.y.data(), at, dy);
+      const Floats outwards = dx * cosine + dy * sine;
+      const Floats radial = one * outwards > other * outwards ? one * outwards : other * outwards;
+      seen |= inside;
+      edge |= inside & (radial > edges.threshold) & (radial * radial > 0.6F * (dx * dx + dy * dy));
     }
-    in_view += seen;
-    met += edge;
-    if (met + looks - 1 - k < fewest_met) return false;
+    all_seen += seen, all_met += edge;
   }
+  int in_view = 0, met = 0;
+  for (int l = 0; l < lanes; ++l) in_view -= all_seen[l], met -= all_met[l];
   return met >= fewest_met && 10 * met >= 4 * in_view;
 }
 
@@ -300,8 +344,10 @@ class VoteMap {
       const std::size_t first = std::max<std::size_t>(k * block, 2), last = std::min((k + 1) * block, width_ - 2);
       Count most = 0;  // by value, so that g++ takes many columns at once
       for (std::size_t column = first; column < last; ++column) most = here[column] > most ? here[column] : most;
+      // Neither is the highest one of three that is lower than one beside it.
       for (std::size_t column = most < least ? last : first; column < last; ++column)
-        if (here[column] >= least && highest(row, column, here[column]))
+        if (here[column] >= least && here[column] > here[column - 1] && here[column] >= here[column + 1] &&
+            highest(row, column, here[column]))
           peaks.push_back({static_cast<double>(column), static_cast<double>(row), radius});
     }
   }
@@ -372,9 +418,11 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
   Circle circle = start;
   if (!worth_fitting(edges, start, sign, std::max(1.2, rays.reach * start.radius))) return circle;
   constexpr int rounds = 3;
+  const Directions directions(rays.count);
   MetAround around;
   std::vector<MetEdge> met;
   std::vector<float> slopes;
+  met.reserve(most_directions), slopes.reserve(most_directions);
   for (int round = 0; round <= rounds; ++round) {
     const double narrow = std::max(least_tolerance, rays.tolerance * circle.radius);
     const double wide = std::max(1.2, rays.reach * circle.radius);
@@ -385,9 +433,9 @@ Circle fit_circle(const EdgeMap& edges, const Circle& start, Polarity polarity, 
     circle.directions = rays.count;
     int in_view = 0;
     double square = 0;
-    look_around(edges, circle, rays.count, sign, reach, around);
+    look_around(edges, circle, directions, sign, reach, around);
     for (int k = 0; k < rays.count; ++k) {
-      const auto [cosine, sine] = direction_of(k, rays.count);
+      const auto [cosine, sine] = directions.of[static_cast<std::size_t>(k)];
       const Met& one = around[static_cast<std::size_t>(k)];
       in_view += one.in_view;
       if (!one.edge || !one.in_view || std::abs(one.offset) > reach) continue;
@@ -424,7 +472,7 @@ double radius_towards(const EdgeMap& edges, const Circle& circle, Polarity polar
   const float sign = sign_of(polarity);
   constexpr double reach = 0.15;  // radii
   MetAround around;
-  look_around(edges, circle, circle.directions, sign, std::max(1.2, reach * circle.radius), around);
+  look_around(edges, circle, Directions(circle.directions), sign, std::max(1.2, reach * circle.radius), around);
   std::vector<float> distances;
   for (int k = 0; k < circle.directions; ++k) {
     if ((open >> static_cast<unsigned>(k) & 1U) == 0) continue;

@@ -138,10 +138,17 @@ float threshold_of(const GrayFrame& frame, const EdgeMap& edges, Pixels pixels) 
 
 // First pixel of a line, from `column` on, that is marked; its end where there is none.
 int next_steep(const std::vector<std::uint8_t>& steep, int column) {
+  constexpr int at_once = 8;
   const auto size = static_cast<int>(steep.size());
-  if (column >= size) return size;
-  const void* found = std::memchr(steep.data() + column, 1, static_cast<std::size_t>(size - column));
-  return found == nullptr ? size : static_cast<int>(static_cast<const std::uint8_t*>(found) - steep.data());
+  while (column < size) {
+    std::uint64_t marks = 1;
+    if (column + at_once <= size) std::memcpy(&marks, steep.data() + column, sizeof marks);
+    const int end = std::min(size, column + at_once);
+    for (; marks != 0 && column < end; ++column)
+      if (steep[static_cast<std::size_t>(column)] != 0) return column;
+    column = end;
+  }
+  return size;
 }
 
 // Squares of the gradients' sizes, of the three rows about one.
@@ -181,10 +188,11 @@ void thin(EdgeMap& edges) {
     for (int column = next_steep(steep, 1); column + 1 < width; column = next_steep(steep, column + 1)) {
       const float here = square[column], x = to_x[column], y = to_y[column];
       constexpr float diagonal = 0.4142F;  // tan 22.5 degrees
-      const int step_x = std::abs(x) < diagonal * std::abs(y) ? 0 : x > 0 ? 1 : -1;
-      const int step_y = std::abs(y) < diagonal * std::abs(x) ? 0 : y > 0 ? 1 : -1;
-      if (beside[static_cast<std::size_t>(1 + step_y)][column + step_x] > here) continue;
-      if (beside[static_cast<std::size_t>(1 - step_y)][column - step_x] >= here) continue;
+      const int across = std::abs(x) >= diagonal * std::abs(y), down = std::abs(y) >= diagonal * std::abs(x);
+      const int step_x = x > 0 ? across : -across, step_y = y > 0 ? down : -down;
+      const float after = beside[static_cast<std::size_t>(1 + step_y)][column + step_x],
+                  before = beside[static_cast<std::size_t>(1 - step_y)][column - step_x];
+      if (after > here || before >= here) continue;
       const float size = std::sqrt(here);
       edges.ridge.push_back({static_cast<float>(column), static_cast<float>(row), x / size, y / size});
     }

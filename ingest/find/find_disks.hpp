@@ -50,6 +50,8 @@ struct FindOptions {
   bool hold_radius = false;           // keep radius_px exactly
   // Beyond it none is looked for. Where radius_px is given, 0.8 to 1.25 times that is looked for instead.
   std::optional<double> largest_radius_px{};
+  // Smaller beads are of no use: none are learned where all circles seen are much smaller and no radius is given.
+  std::optional<double> smallest_radius_px{};
   std::optional<BeadsSeen> seen{};      // for learn_beads()
   bool one_size = false;                // learn_beads() looks for no beads of other sizes
   bool rims_of_one_size = false;        // learn_beads() searches rims at a higher resolution for one size only

@@ -45,7 +45,7 @@ ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double 
   inverse_step_ = static_cast<float>(1 / step);
   last_ = static_cast<int>(std::ceil(reach_ * reach_ / step));
   const std::size_t count = static_cast<std::size_t>(last_) + 1;
-  level_.resize(count);
+  level_.assign(count + 1, 0.0F);  // and one more, for gather_with_next()
   rise_.assign(count, 0.0F);
   for (std::size_t i = 0; i < count; ++i)
     level_[i] =
@@ -79,14 +79,12 @@ ProfileTable::ProfileTable(const BeadProfile& profile, double radius_px, double 
   if (overlaps) prepare_overlaps(radius_px, edge_px);
   fourth_ = std::any_of(profile.fourth_harmonic.begin(), profile.fourth_harmonic.end(), [](float v) { return v != 0; });
   if (fourth_) {
-    fourth_level_.assign(count, 0.0F);
-    fourth_rise_.assign(count, 0.0F);
+    fourth_level_.assign(count + 1, 0.0F);
     for (std::size_t i = 1; i + 1 < count; ++i) {
       const double squared = static_cast<double>(i) * step;
       fourth_level_[i] = static_cast<float>(interpolate(profile.fourth_harmonic, profile.step_px, std::sqrt(squared)) /
                                             (squared * squared));
     }
-    for (std::size_t i = 0; i + 1 < count; ++i) fourth_rise_[i] = fourth_level_[i + 1] - fourth_level_[i];
   }
 }
 
@@ -175,7 +173,6 @@ void JointFit::subtract(double x, double y, float sign) {
   const float inverse = table.inverse_step_;
   const int last = table.last_;
   const float* level = table.level_.data();
-  const float* rise = table.rise_.data();
   for (int row = top; row <= bottom; ++row) {
     const double dy = row - y;
     const double half = std::sqrt(std::max(0.0, reach * reach - dy * dy));
@@ -191,16 +188,14 @@ void JointFit::subtract(double x, double y, float sign) {
       const Floats place = (dx * dx + dy_squared) * inverse;
       Ints cell = __builtin_convertvector(place, Ints);
       cell = cell < last ? cell : last;
-      Floats base, slope, present;
-      gather(level, cell, base);
-      gather(rise, cell, slope);
+      Floats base, next, present;
+      gather_with_next(level, cell, base, next);
       const Floats part = place - __builtin_convertvector(cell, Floats);
-      Floats value = base + part * slope;
+      Floats value = base + part * (next - base);
       if (table.fourth_) {
-        gather(table.fourth_level_.data(), cell, base);
-        gather(table.fourth_rise_.data(), cell, slope);
+        gather_with_next(table.fourth_level_.data(), cell, base, next);
         const Floats a = dx * dx;
-        value += (base + part * slope) * (a * a - 6 * a * dy_squared + dy_squared * dy_squared);
+        value += (base + part * (next - base)) * (a * a - 6 * a * dy_squared + dy_squared * dy_squared);
       }
       load(line + k, present);
       store(present - sign * value, line + k);
@@ -222,7 +217,6 @@ void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
   const float inverse = table.inverse_step_;
   const int last = table.last_;
   const float* level = table.level_.data();
-  const float* rise = table.rise_.data();
   for (int row = top; row <= bottom; ++row) {
     const double old_dy = row - old_y, new_dy = row - new_y;
     const double half = std::sqrt(std::max(0.0, reach * reach - std::min(old_dy * old_dy, new_dy * new_dy)));
@@ -240,13 +234,11 @@ void JointFit::move(double old_x, double old_y, double new_x, double new_y) {
       Ints old_cell = __builtin_convertvector(old_place, Ints), new_cell = __builtin_convertvector(new_place, Ints);
       old_cell = old_cell < last ? old_cell : last;
       new_cell = new_cell < last ? new_cell : last;
-      Floats old_base, old_slope, new_base, new_slope, present;
-      gather(level, old_cell, old_base);
-      gather(rise, old_cell, old_slope);
-      gather(level, new_cell, new_base);
-      gather(rise, new_cell, new_slope);
-      const Floats before = old_base + (old_place - __builtin_convertvector(old_cell, Floats)) * old_slope;
-      const Floats after = new_base + (new_place - __builtin_convertvector(new_cell, Floats)) * new_slope;
+      Floats old_base, old_next, new_base, new_next, present;
+      gather_with_next(level, old_cell, old_base, old_next);
+      gather_with_next(level, new_cell, new_base, new_next);
+      const Floats before = old_base + (old_place - __builtin_convertvector(old_cell, Floats)) * (old_next - old_base);
+      const Floats after = new_base + (new_place - __builtin_convertvector(new_cell, Floats)) * (new_next - new_base);
       load(line + k, present);
       store(present + (before - after), line + k);
     }

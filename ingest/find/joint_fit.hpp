@@ -55,7 +55,7 @@ class ProfileTable {
   std::vector<float> level_, rise_, soft_rise_;
   std::shared_ptr<const BeadAsymmetry> asymmetry_;
   bool fourth_ = false;
-  std::vector<float> fourth_level_, fourth_rise_;  // p4(r)/r^4
+  std::vector<float> fourth_level_;  // p4(r)/r^4
 };
 
 // Residual image of one frame and the beads that explain it.

@@ -26,9 +26,11 @@ constexpr double usual_edge = 0.75;
 // Light and profile are learned in turns at least this often, and no more often than the second.
 constexpr int least_rounds = 5, most_learning_rounds = 12;
 // Contrast units: what is left is larger than the beads, so light and bead run away from the frame.
-constexpr double hopeless = 3;
+constexpr double runs_away = 3;
 // Contrast units beyond the noise: where more is left than that, the frame shows something else.
 constexpr double most_left_over = 0.2;
+// Of the radius a start begins with: how far the radius may go from it.
+constexpr double farthest_radius = 0.12;
 // px: the outline no longer moves the centres.
 constexpr double still = 0.01;
 
@@ -75,6 +77,8 @@ void drop_plain_background(std::vector<SolidBorder>& borders, const GrayFrame& f
   });
 }
 
+class BeadLearner;
+
 // What was learned, from one start.
 struct Learned {
   CalibrationResult result;
@@ -84,7 +88,12 @@ struct Learned {
   double unexplained = 0;  // of the first frame, grey levels squared
   bool complete = false;   // hardly more than its noise
   bool astray = false;     // the radius went as far from the estimate as it may
+  // Where learning paused, since it cannot become complete any more: what goes on with it.
+  std::shared_ptr<BeadLearner> paused;
 };
+
+// How long beads are learned: to the end, or until it shows that a frame will not be explained down to its noise.
+enum class LearnUntil { settled, hopeless };
 
 // What learning may take into account.
 struct Allowed {
@@ -120,7 +129,40 @@ class BeadLearner {
     beads_->learn_profile = options.learn_profile;
   }
 
-  Learned learn() {
+  // Goes on where it paused.
+  Learned learn(LearnUntil until) {
+    if (seen_by_)
+      go_on_plainly();
+    else if (beads_->flats.empty())
+      begin();
+    for (;; ++round_) {
+      paused_ = until == LearnUntil::hopeless && cannot_complete();
+      if (paused_) return so_far();
+      fit_beads(round_);
+      if (beads_->total() == 0) return refused("no model of a filled disk fits them");
+      if (round_ == 0 && !background_looked_at_ && corrects_background()) {
+        --round_;
+        continue;
+      }
+      keep_good_beads(round_);
+      if (!(beads_->spread < runs_away)) return refused("no model of the bead and the light describes the frame");
+      const bool enough = round_ + 1 >= first_round() + least_rounds && settled_;
+      if (round_ + 1 == most_rounds() || enough) break;
+      if (options_.learn_profile || round_ < 2) learn_bead(round_);
+      outline_moved_px_ = 0;
+      const bool may_be_one_sided = allowed_.one_sided && options_.learn_profile && round_ >= 1;
+      const bool renewed = may_be_one_sided && (round_ <= 2 || profile_.asymmetry) && !learn_one_sidedness();
+      if (round_ >= 1) learn_light(renewed);
+      past_.push_back({beads_->spread, radius_, all_.astray});
+    }
+    return concluded();
+  }
+  [[nodiscard]] bool paused() const { return paused_; }
+  // As it was before light from one side was allowed for: what learns without. None where there is no such light.
+  [[nodiscard]] std::shared_ptr<BeadLearner> plain() const { return plain_; }
+
+ private:
+  void begin() {
     set_borders_aside();
     profile_ = start_.before ? start_.before->profile : ideal_profile(radius_, edge_, reach_of(radius_, edge_));
     beads_->flats.resize(recorded_.size());
@@ -128,28 +170,65 @@ class BeadLearner {
     beads_->disks.resize(recorded_.size());
     if (!options_.hold_radius && !options_.radius_px && !start_.before) choose_first_radius();
     background_looked_at_ = !allowed_.corrected_background;
-    const int first_round = start_.before ? 1 : 0;
-    for (int round = first_round;; ++round) {
-      fit_beads(round);
-      if (beads_->total() == 0) return refused("no model of a filled disk fits them");
-      if (round == 0 && !background_looked_at_ && corrects_background()) {
-        --round;
-        continue;
-      }
-      keep_good_beads(round);
-      if (!(beads_->spread < hopeless)) return refused("no model of the bead and the light describes the frame");
-      const bool enough = round + 1 >= first_round + least_rounds && settled_;
-      if (round + 1 == (profile_.asymmetry ? 2 : 1) * most_learning_rounds || enough) break;
-      if (options_.learn_profile || round < 2) learn_bead(round);
-      outline_moved_px_ = 0;
-      const bool may_be_one_sided = allowed_.one_sided && options_.learn_profile && round >= 1;
-      if (may_be_one_sided && (round <= 2 || profile_.asymmetry)) learn_one_sidedness();
-      if (round >= 1) learn_light();
-    }
-    return concluded();
+    round_ = first_round();
   }
 
- private:
+  void keep_plain() {
+    plain_ = std::make_shared<BeadLearner>(*this);
+    plain_->allowed_.one_sided = false;
+    plain_->seen_by_ = beads_;
+    plain_->beads_ = std::make_shared<LearnedBeads>();
+    plain_->beads_->disks = beads_->disks;
+    plain_->beads_->knot = beads_->knot, plain_->beads_->spread = beads_->spread;
+    plain_->beads_->hold_radius = beads_->hold_radius, plain_->beads_->learn_profile = beads_->learn_profile;
+  }
+
+  // The rest of the round in which light from one side was seen.
+  void go_on_plainly() {
+    beads_->seen = std::exchange(seen_by_, nullptr)->seen;
+    for (const GrayFrame& seen : beads_->seen) {
+      beads_->flats.push_back(flatten(seen, light_));
+      beads_->fits.push_back(std::make_unique<JointFit>(beads_->flats.back()));
+    }
+    learn_light(false);
+    past_.push_back({beads_->spread, radius_, all_.astray});
+    ++round_;
+  }
+
+  [[nodiscard]] int first_round() const { return start_.before ? 1 : 0; }
+  [[nodiscard]] int most_rounds() const { return (profile_.asymmetry ? 2 : 1) * most_learning_rounds; }
+
+  // What is left may not exceed this, in contrast units, where the frame is explained completely; and where beads are
+  // believed at all.
+  [[nodiscard]] static double left_if_complete(double noise) { return 1.5 * noise + 0.03; }
+  [[nodiscard]] static double left_at_most(double noise) { return std::hypot(noise, most_left_over); }
+
+  // Whether beads lit from one side will not explain the frame completely, even if what is left goes on to fall as it
+  // did lately: it falls ever more slowly. The radius must not be on its way to where it may go no farther.
+  [[nodiscard]] bool cannot_complete() const {
+    constexpr std::size_t lately = 4;
+    constexpr double clearly = 1.1;
+    if (past_.size() <= lately || !profile_.asymmetry || all_.background_corrected) return false;
+    const Past &now = past_.back(), &before = past_[past_.size() - 1 - lately];
+    for (std::size_t k = past_.size() - lately; k < past_.size(); ++k)
+      if (past_[k].astray != now.astray || (now.astray && past_[k].radius_px != now.radius_px)) return false;
+    const double to_come = static_cast<double>(most_rounds() - round_) / static_cast<double>(lately);
+    const double moved =
+        std::abs(now.radius_px - start_.radius_px) + to_come * std::abs(now.radius_px - before.radius_px);
+    if (!now.astray && moved >= farthest_radius * start_.radius_px) return false;
+    const double noise = noise_of(beads_->flats.front());
+    const double left = now.spread - to_come * std::max(0.0, before.spread - now.spread);
+    return now.spread < left_at_most(noise) && left > clearly * left_if_complete(noise);
+  }
+
+  [[nodiscard]] Learned so_far() const {
+    Learned learned = all_;
+    learned.result.found = true;
+    learned.result.calibration.radius_px = learned.result.calibration.rim_radius_px = radius_;
+    learned.one_sided = true;
+    return learned;
+  }
+
   [[nodiscard]] std::string suspected(const std::string& circles) const {
     return circles + " of " + std::to_string(radius_ * options_.recorded_px) + " px radius were examined, but ";
   }
@@ -272,7 +351,7 @@ class BeadLearner {
                                                .row_step = round < 2 ? 3 : 1});
     const RimFit rim = fit_rim(learned, radius_, edge_);
     if (rim.good) {  // the first estimate is good to some 5 %: a fit far from it has gone astray
-      const double bound = round == 0 ? 0.05 : 0.12;
+      const double bound = round == 0 ? 0.05 : farthest_radius;
       if (!options_.hold_radius)
         radius_ = std::clamp(rim.radius_px, (1 - bound) * start_.radius_px, (1 + bound) * start_.radius_px);
       all_.astray = !options_.hold_radius && radius_ != rim.radius_px;
@@ -290,15 +369,18 @@ class BeadLearner {
     }
   }
 
-  // Light from one side: the lit side pulls at the centres of radial beads. The outline shows where they are.
-  void learn_one_sidedness() {
+  // Light from one side: the lit side pulls at the centres of radial beads. The outline shows where they are. Whether
+  // the profile changed.
+  bool learn_one_sidedness() {
     renew_residuals();
-    profile_.asymmetry =
+    std::shared_ptr<const BeadAsymmetry> asymmetry =
         learn_asymmetry(beads_->fit_pointers(), beads_->disk_pointers(), profile_,
                         {.radius_px = radius_, .noise = beads_->spread, .row_step = profile_.asymmetry ? 1 : 2});
-    if (!profile_.asymmetry) return;
+    if (!asymmetry) return false;
+    if (!profile_.asymmetry) keep_plain();
+    profile_.asymmetry = std::move(asymmetry);
     const Outline outline = outline_of(profile_, radius_, edge_);
-    if (!outline.good) return;
+    if (!outline.good) return true;
     outline_moved_px_ = std::hypot(outline.x_px, outline.y_px);
     profile_ = recentred(profile_, outline.x_px, outline.y_px);
     for (auto& one : beads_->disks)
@@ -306,10 +388,11 @@ class BeadLearner {
         disk.x += outline.x_px;
         disk.y += outline.y_px;
       }
+    return true;
   }
 
-  void learn_light() {
-    renew_residuals();
+  void learn_light(bool renewed) {
+    if (!renewed) renew_residuals();
     std::vector<TileSums> tiles;
     for (std::size_t f = 0; f < recorded_.size(); ++f)
       add_tile_sums(beads_->flats[f], *beads_->fits[f], beads_->spread, tiles);
@@ -325,7 +408,7 @@ class BeadLearner {
     if (total == 0) return refused("none looks like a filled bead");
     const double spread = beads_->spread, noise = noise_of(beads_->flats.front());
     CalibrationResult& result = all_.result;
-    if (spread * spread > noise * noise + most_left_over * most_left_over) {
+    if (spread > left_at_most(noise)) {
       result.why_not =
           "no disks seen: " + suspected(std::to_string(total) + " circles") + "they do not explain the frame";
       return std::move(all_);
@@ -349,24 +432,34 @@ class BeadLearner {
                                      " disks, so its radius is uncertain. Use more frames.");
     all_.unexplained = unexplained_of(*beads_->fits.front(), light_);
     all_.one_sided = profile_.asymmetry != nullptr;
-    all_.complete = spread < 1.5 * noise + 0.03;
+    all_.complete = spread < left_if_complete(noise);
     result.found = true;
     return std::move(all_);
   }
 
   const FindOptions& options_;
   const Start start_;
-  const Allowed allowed_;
+  Allowed allowed_;
   Learned all_;
   std::vector<const GrayFrame*> recorded_;
   std::vector<std::vector<SolidBorder>> borders_;  // of each frame
-  const std::shared_ptr<LearnedBeads> beads_ = std::make_shared<LearnedBeads>();
+  std::shared_ptr<LearnedBeads> beads_ = std::make_shared<LearnedBeads>();
   double radius_ = 0, edge_ = 0;  // px
   LightField light_;
   BeadProfile profile_;
   ProfileTable table_;  // of the profile; the fits refer to it
   bool background_looked_at_ = false, settled_ = false;
   double last_change_ = 0, outline_moved_px_ = 0;
+  int round_ = 0;
+  bool paused_ = false;
+  std::shared_ptr<BeadLearner> plain_;
+  std::shared_ptr<const LearnedBeads> seen_by_;  // of what was kept before light from one side: where its frames are
+  // After each round: what is left of the frame, contrast units, and the radius.
+  struct Past {
+    double spread, radius_px;
+    bool astray;
+  };
+  std::vector<Past> past_;
 };
 
 // Which of several starts explains the frames: as estimated, as a packed bed seen from its voids, or any of the other
@@ -378,6 +471,11 @@ class StartChooser {
 
   CalibrationResult choose() {
     estimate();
+    if (ends_too_small()) {
+      CalibrationResult nothing;
+      nothing.why_not = "no disks seen: the circles seen are too small";
+      return nothing;
+    }
     if (!estimate_.found) {
       Learned nothing;
       nothing.result.why_not = "no disks seen: " + estimate_.why_not;
@@ -413,15 +511,39 @@ class StartChooser {
     estimate_.packed_radius_px = 0;
   }
 
+  // Whether no start leads to beads of the smallest radius asked for.
+  [[nodiscard]] bool ends_too_small() const {
+    if (!options_.smallest_radius_px || options_.radius_px) return false;
+    constexpr double most_growth = 2;  // three times by 1.12, and what the tone curve adds
+    double largest = std::max(estimate_.packed_radius_px, estimate_.found ? estimate_.radius_px : 0.0);
+    for (const auto& other : estimate_.others) largest = std::max(largest, other.radius_px);
+    return largest > 0 && largest * most_growth < *options_.smallest_radius_px;
+  }
+
+  using Learner = std::shared_ptr<BeadLearner>;
+  [[nodiscard]] Learner learner_of(const Start& from, const Allowed& allowed) const {
+    return std::make_shared<BeadLearner>(frames_, options_, from, allowed);
+  }
+  static Learned learned_by(const Learner& learner, LearnUntil until) {
+    Learned learned = learner->learn(until);
+    if (learner->paused()) learned.paused = learner;
+    return learned;
+  }
+
+  static void finish(Learned& learned) {
+    if (learned.paused) learned = learned.paused->learn(LearnUntil::settled);
+  }
+
   // Again from the radius found while that went as far as it may, and with the background as it was if its correction
   // explains less.
-  Learned learn(Start from, Allowed allowed) const {
+  Learned learn(const Learner& first, Start from, Allowed allowed) const {
     constexpr int most_starts = 3;
     constexpr double as_good = 1.02;
-    Learned best = BeadLearner(frames_, options_, from, allowed).learn();
+    // Beads lit from one side must explain the frame completely, and so must what is learned again.
+    Learned best = learned_by(first, allowed.one_sided ? LearnUntil::hopeless : LearnUntil::settled);
     if (best.background_corrected && !best.complete) {
       allowed.corrected_background = false;
-      Learned as_it_was = BeadLearner(frames_, options_, from, allowed).learn();
+      Learned as_it_was = learned_by(learner_of(from, allowed), LearnUntil::settled);
       if (as_it_was.result.found && (!best.result.found || as_it_was.unexplained < best.unexplained))
         best = std::move(as_it_was);
       else
@@ -429,8 +551,10 @@ class StartChooser {
     }
     for (int start = 1; start < most_starts && best.result.found && best.astray; ++start) {
       from.radius_px = best.result.calibration.rim_radius_px;
-      Learned again = BeadLearner(frames_, options_, from, allowed).learn();
-      if (!again.result.found || !again.complete || again.unexplained > as_good * best.unexplained) break;
+      Learned again = learned_by(learner_of(from, allowed), LearnUntil::hopeless);
+      if (!again.result.found || !again.complete) break;
+      finish(best);
+      if (again.unexplained > as_good * best.unexplained) break;
       best = std::move(again);
     }
     return best;
@@ -438,10 +562,14 @@ class StartChooser {
 
   // Shadows beside the beads, say, are not the beads' own light.
   [[nodiscard]] Learned learn(const Start& from) const {
-    Learned best = learn(from, {});
+    const Learner first = learner_of(from, {});
+    Learned best = learn(first, from, {});
     if (!best.one_sided || (best.complete && !best.astray)) return best;
-    Learned plain = learn(from, {.one_sided = false});
-    return plain.result.found ? plain : best;
+    const Allowed plainly{.one_sided = false};
+    Learned plain = learn(first->plain() ? first->plain() : learner_of(from, plainly), from, plainly);
+    if (plain.result.found) return plain;
+    finish(best);
+    return best;
   }
 
   // What explains the frame little gives way to what explains it better: the bright middle of a glass bead to the
@@ -452,6 +580,9 @@ class StartChooser {
     const bool seen = best.result.found;
     if (options_.radius_px || (best.result.found && best.complete)) return best.result;
     for (const auto& other : estimate_.others) {
+      const bool known =
+          estimate_.found && other.radius_px == estimate_.radius_px && other.polarity == estimate_.polarity;
+      if (known) continue;  // learned as seen
       Learned another = learn(Start{other.radius_px, other.polarity});
       if (!another.result.found || another.typical < mostly_explained || another.result.calibration.disks_used < fewest)
         continue;
@@ -542,7 +673,8 @@ CalibrationResult learn_again(const std::vector<const GrayFrame*>& frames, const
   if (frames.empty()) throw std::invalid_argument("learn_again: there is no frame from which beads could be learned");
   for (const GrayFrame* frame : frames) require_consistent(*frame);
   const Start start{before.rim_radius_px, before.polarity, &before};
-  return BeadLearner(frames, options, start, {.one_sided = before.profile.asymmetry != nullptr}).learn().result;
+  const Allowed allowed{.one_sided = before.profile.asymmetry != nullptr};
+  return BeadLearner(frames, options, start, allowed).learn(LearnUntil::settled).result;
 }
 
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {

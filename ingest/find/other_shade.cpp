@@ -138,6 +138,7 @@ std::optional<SeenShade> seen_of(const GrayFrame& frame, const FinderCalibration
   if (enough(seen.expected, found)) return seen;
   CensusOptions asked;
   asked.polarity = polarity;
+  asked.smallest_radius_px = std::max(asked.smallest_radius_px, smallest_other * calibration.radius_px);
   std::size_t tried = 0;
   for (const CircleHypothesis& hypothesis : take_census({&seen.painted}, asked).hypotheses) {
     const double ratio = hypothesis.radius_px / calibration.radius_px;

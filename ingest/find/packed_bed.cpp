@@ -166,6 +166,7 @@ std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::
     find.polarity = start.polarity;
     find.radius_px = start.radius_px;
     find.largest_radius_px = largest_start * largest_packed_px;
+    find.smallest_radius_px = smallest_px;
     PackedBed bed = learn_packed_bed({part ? &*part : &frame}, find);
     if (!is_small(bed)) continue;
     if (!part) return bed;

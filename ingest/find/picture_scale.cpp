@@ -91,7 +91,7 @@ const float* StretchedLines::line(int row) {
     const Floats right = x - __builtin_convertvector(left, Floats), down = y - __builtin_convertvector(above, Floats);
     const Ints at = above * frame_.width + left;
     Floats a, b, c, d;
-    gather(upper, at, a), gather(upper + 1, at, b), gather(lower, at, c), gather(lower + 1, at, d);
+    gather_with_next(upper, at, a, b), gather_with_next(lower, at, c, d);
     const Floats on_upper = (1 - right) * a + right * b, on_lower = (1 - right) * c + right * d;
     store((1 - down) * on_upper + down * on_lower, line_.data() + first);
   }

@@ -339,6 +339,21 @@ TEST(Finder, LooksForNoneBeyondTheLargestRadius) {
   EXPECT_TRUE(!small.found || small.calibration.radius_px < 1.5 * 17.5) << small.calibration.radius_px;
 }
 
+TEST(Finder, NothingIsLearnedWhereAllCirclesAreFarTooSmall) {
+  const auto disks = make_synthetic_bed(
+      {.left_wall_px = 10, .right_wall_px = 290, .floor_px = 230, .radius_px = 14, .rows = 4, .seed = 31});
+  const GrayFrame frame = render_frame(disks, {.width = 300, .height = 240});
+  FindOptions options;
+  const CalibrationResult any = learn_finder({&frame}, options);
+  ASSERT_TRUE(any.found) << any.why_not;
+  options.smallest_radius_px = 14;
+  EXPECT_EQ(learn_finder({&frame}, options).calibration.radius_px, any.calibration.radius_px);
+  options.smallest_radius_px = 1000;
+  const CalibrationResult none = learn_finder({&frame}, options);
+  EXPECT_FALSE(none.found);
+  EXPECT_EQ(none.why_not, "no disks seen: the circles seen are too small");
+}
+
 TEST(Finder, TransparentBeadsAreNotTaken) {
   Camera camera;
   camera.width = 500;

@@ -10,6 +10,7 @@
 
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/bead_set.hpp"
+#include "ingest/find/vector_lanes.hpp"
 #include "tests/ingest/by_hand.hpp"
 
 namespace shakebed::ingest {
@@ -632,6 +633,18 @@ TEST(BeadSet, StepsUntilNothingMoves) {
   fit.reset(flat, disks);
   EXPECT_FALSE(step_all(fit, flat, disks, {1e-3, 2, 0}));
   EXPECT_NEAR(disks[27].x, truth[27].x + 0.9, 0.01) << "half a pixel a step";
+}
+
+TEST(VectorLanes, ValuesAreLoadedWithTheNextOne) {
+  std::vector<float> table;
+  for (int k = 0; k < 40; ++k) table.push_back(0.5F * static_cast<float>(k * k));
+  const Ints cell = {0, 38, 7, 7, 1, 20, 13, 2};
+  Floats here, next;
+  gather_with_next(table.data(), cell, here, next);
+  for (int l = 0; l < lanes; ++l) {
+    EXPECT_EQ(here[l], table[static_cast<std::size_t>(cell[l])]) << l;
+    EXPECT_EQ(next[l], table[static_cast<std::size_t>(cell[l]) + 1]) << l;
+  }
 }
 
 }  // namespace
