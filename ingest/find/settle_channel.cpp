@@ -24,6 +24,7 @@ constexpr int trial_side_px = 640;     // of the part of a frame that trials loo
 // The same where there is one channel, to see whether faces are alike. In 400 px a packed bed may hide all ground, and
 // is then found by its rims.
 constexpr int lone_side_px = 480;
+constexpr int glance_side_px = 320;  // of the part, where only the channel is asked for: a quarter of the time
 constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
 // The same, for a change from faces to rims: their centres may be wrong by a tenth of a radius, so that they have to
 // show another tenth of the beads.
@@ -141,7 +142,7 @@ class ChannelTrials {
     std::vector<std::pair<double, double>> places;
     for (const RimDisk& disk : best.disks) places.emplace_back(disk.circle.x / all, disk.circle.y / all);
     const GrayFrame& frame = frames.channels.front().frame;
-    const int side = frames.channels.size() > 1 ? trial_side_px : lone_side_px;
+    const int side = options.channel_alone ? glance_side_px : frames.channels.size() > 1 ? trial_side_px : lone_side_px;
     part_ = part_with_most(places, side, frame.width / factor_, frame.height / factor_);
     if (!options.roi) return;
     roi_ = PixelRectangle{options.roi->left / all - part_.left, options.roi->top / all - part_.top,
