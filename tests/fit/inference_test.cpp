@@ -1,6 +1,7 @@
 // Surrogates and posteriors against what can be worked out, and their calibration on a stand-in for the simulation.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
@@ -114,6 +115,33 @@ TEST(Surrogate, FindsTheLengthOfEachParameter) {
   EXPECT_LT(surrogate.lengths()[0], 0.3);
   EXPECT_GT(surrogate.lengths()[1], 1.5);
   EXPECT_NEAR(surrogate.scatter(0) / 0.05, 1, 0.4) << "of 50 runs, 4 standard errors";
+}
+
+// The scatter grows with the value, up to three standard deviations of the values. Beyond these it is not extrapolated.
+TEST(Surrogate, DoesNotExtrapolateItsScatter) {
+  TrainingSet runs;
+  runs.parameters = 1, runs.outputs = 1;
+  std::mt19937_64 generator(4);
+  constexpr int number = 80;
+  double sum = 0, squares = 0;
+  for (int r = 0; r < number; ++r) {
+    const double x = (r + 0.5) / number, value = std::pow(x, 10);
+    runs.points.push_back(x);
+    runs.values.push_back(value + 0.004 * std::exp(3 * value) * normal_quantile(even_number(generator)));
+    sum += value / number, squares += value * value / number;
+  }
+  const Surrogate surrogate = Surrogate::train(runs);
+  std::vector<double> below, beyond;
+  double farthest = 0;
+  for (double x = 0.9; x < 1; x += 0.002) {
+    const auto found = surrogate.predict(std::vector<double>{x});
+    const double level = (found.mean[0] - sum) / std::sqrt(squares - sum * sum);
+    (level < 3 ? below : beyond).push_back(found.scatter[0]);
+    farthest = std::max(farthest, level);
+  }
+  EXPECT_GT(farthest, 3.1);
+  EXPECT_GT(below.back() / below.front(), 2);
+  for (const double scatter : beyond) EXPECT_NEAR(scatter / beyond.front(), 1, 1e-9);
 }
 
 TEST(Surrogate, NeedsRunsEnough) {
