@@ -32,6 +32,7 @@ TEST(Audit, RecomputesThePaper) {
   EXPECT_NEAR(row("zeta_F predicted").recomputed, 4.154, 5e-4);
   EXPECT_EQ(row("zeta_F predicted").status, AuditStatus::agrees);
   EXPECT_NEAR(row("z_o").recomputed, 11.99, 5e-3);
+  EXPECT_NE(row("z_o").explanation.find("it gives 1.62)"), std::string::npos) << "1.10 x 4.41/2.99";
   EXPECT_NEAR(row("area under the published fit").recomputed, 11.06, 5e-3);
   EXPECT_NE(row("area under the published fit").explanation.find("11.5"), std::string::npos);
   EXPECT_NEAR(row("T/T_c from the map").recomputed, 0.6659, 5e-5);
