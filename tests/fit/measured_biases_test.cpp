@@ -59,6 +59,24 @@ TEST(KnownBiases, AreThoseOfTheManual) {
   EXPECT_EQ(compared, 14 * thermometer_count - 3) << "three have fewer than five readings";
 }
 
+// What a thermometer reads is in its name: from which height up (1.5 D otherwise), below which density, N known, the
+// curve of the paper, which is shown beside the others.
+TEST(Thermometers, ReadWhatTheirNamesSay) {
+  for (const Thermometer& one : thermometers()) {
+    const std::string name(one.name);
+    const auto number_after = [&](const std::string& word, double otherwise) {
+      const std::size_t at = name.find(word);
+      return at == std::string::npos ? otherwise : std::stod(name.substr(at + word.size()));
+    };
+    const bool of_the_paper = name.rfind("Enskog", 0) == 0;
+    EXPECT_EQ(one.floor_exclusion, number_after(" from ", 1.5)) << name;
+    EXPECT_EQ(one.below_density, number_after(" below ", 0)) << name;
+    EXPECT_EQ(one.column_known, name.find("N known") != std::string::npos) << name;
+    EXPECT_EQ(one.model, of_the_paper ? "enskog-rectangle" : "hydrostatic:best-of") << name;
+    EXPECT_NE(one.votes, of_the_paper) << name;
+  }
+}
+
 // Of the thermometers that vote, the first in the list, unless a later one scatters by less than 0.8 of it. From 0.2 to
 // 0.203 m g D densities below 0.8 do: at 0.2015 by 0.70 % and 0.89 %. At 1 m g D none does.
 TEST(Answer, IsThatOfTheThermometerThatScattersLeast) {
