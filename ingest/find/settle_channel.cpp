@@ -24,7 +24,7 @@ constexpr int trial_side_px = 640;     // of the part of a frame that trials loo
 // The same where there is one channel, to see whether faces are alike. In 400 px a packed bed may hide all ground, and
 // is then found by its rims.
 constexpr int lone_side_px = 480;
-constexpr int glance_side_px = 320;  // of the part, where only the channel is asked for: a quarter of the time
+constexpr int glance_side_px = 320;    // of the part, where only the channel is asked for: a quarter of the time
 constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
 // The same, for a change from faces to rims: their centres may be wrong by a tenth of a radius, so that they have to
 // show another tenth of the beads.

@@ -7,7 +7,7 @@
 
 int main(int argc, char** argv) {
   using namespace shakebed::pipelines;
-  // The decoders of films write lines of their own about a damaged file. The program names the file and says what to do.
+  // Decoders of films write lines of their own about a damaged file. The program names the file and what to do.
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   return exit_code_of([&] {
     Program program(argc, argv);
