@@ -91,6 +91,7 @@ keep_test_files_in_memory() {
     unset TMPDIR
     return 0
   fi
+  rm "$TMPDIR/program"
   export TMPDIR
   trap 'rm -rf "$TMPDIR"' EXIT
   trap 'exit 130' INT TERM
