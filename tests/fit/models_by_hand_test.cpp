@@ -31,7 +31,8 @@ std::vector<Case> cases() {
                         {"enskog-rectangle", {2, -1, 1.05}},
                         {"fermi", {0.4, 6, 1.05}},
                         {"fermi", {3, 2, 1.05}},
-                        {"rectangle", {1, 6.03, 1.05}}};
+                        {"rectangle", {1, 6.03, 1.05}},
+                        {"hydrostatic:enskog", {0.12, 7, 1.05}}};  // on a solid of the plateau density
   for (const EquationOfState* equation : equations_of_state()) {
     for (const double t : {0.25, 3.0}) {
       if (t < 1 && equation->name() == "kolafa-rottner") continue;  // it ends at freezing
