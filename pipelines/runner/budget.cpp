@@ -113,8 +113,9 @@ class Chooser {
     const double error = aim * budget_.error;
     const double rest = squared(error) - squared(pilot_.systematic);
     EffortChoice choice;
-    // Beyond the systematic part there is little use in statistics.
-    const double wanted = std::max(rest, squared(error) / 4);
+    // Beyond the systematic part there is little use in statistics. Where that part alone is too large, the error that
+    // the result states is the one asked for.
+    const double wanted = pilot_.systematic < budget_.error ? std::max(rest, squared(error) / 4) : squared(error);
     double least = std::numeric_limits<double>::infinity();
     for (std::uint32_t beds = limits_.fewest_beds; beds <= most_beds; beds += step()) {
       const double cost_so_far = beds * (limits_.settling + shortest_);

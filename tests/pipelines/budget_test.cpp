@@ -142,6 +142,7 @@ TEST(EffortForAnError, IsNotPossibleBelowTheSystematicPart) {
   pilot.systematic = 0.02;
   const EffortChoice choice = choose_effort(pilot, limits(), error_of(0.01), 1);
   EXPECT_FALSE(choice.possible);
+  EXPECT_NEAR(choice.stated_error, 0.009, 1e-4) << "no more is measured than for 1 % without it";
   EXPECT_TRUE(std::isfinite(choice.effort.length));
   EXPECT_GT(choice.error, 0.02);
 }

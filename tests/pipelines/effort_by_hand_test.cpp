@@ -121,9 +121,12 @@ TEST(EffortByHand, IsTheCheapestThatReachesNineTenthsOfAnError) {
     const VarianceByHand variance(one.pilot);
     for (const double error : {0.3, 0.04, 0.011}) {
       const EffortChoice choice = choose_effort(one.pilot, one.limits, {.error = error, .text = ""}, one.jobs);
-      // The systematic part leaves less for statistics, but a quarter of the squares at least.
+      // The systematic part leaves less for statistics, but a quarter of the squares at least. Where it is too large
+      // alone, it counts for nothing.
       const double wanted =
-          std::max(square_of(0.9 * error) - square_of(one.pilot.systematic), square_of(0.9 * error) / 4);
+          one.pilot.systematic >= error
+              ? square_of(0.9 * error)
+              : std::max(square_of(0.9 * error) - square_of(one.pilot.systematic), square_of(0.9 * error) / 4);
       const double shortest = shortest_by_hand(one);
       double least = std::numeric_limits<double>::infinity(), best_length = shortest;
       std::uint32_t best_beds = 10'000;
