@@ -67,8 +67,10 @@ struct SurveyOptions {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;  // px of the full frame
   std::optional<PixelRectangle> roi;
-  bool any_shape = false;      // outlines that are not round, and marks of a drawing, may be beads
-  bool channel_alone = false;  // SurveyCandidate::by_rims is of no interest: it costs a trial of large pictures
+  bool any_shape = false;  // outlines that are not round, and marks of a drawing, may be beads
+  // SurveyCandidate::by_rims is of no interest: it costs a trial of large pictures. Channels are compared in a small
+  // part.
+  bool channel_alone = false;
   // What will be searched for in the picture after the survey: then a trial is this search where it can be
   // (SurveyCandidate::searched). Lengths are px of the full frame, `seen` and `recorded_px` are those of the survey.
   std::optional<FindOptions> search{};

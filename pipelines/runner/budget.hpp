@@ -36,7 +36,9 @@ struct EffortChoice {
   double systematic = 0;
   Work work;
   double wall_seconds = 0;
-  bool possible = true;  // false: no effort gives what is asked for; `effort` is then the nearest to it
+  // false: no effort gives what is asked for. `effort` then has the error asked for without the systematic part, or is
+  // the nearest to it.
+  bool possible = true;
 };
 // The cheapest effort with the error asked for, or the effort with the smallest error in the time. The error that the
 // result will state (with Student's factor for few beds) is the one that is kept to. It also allows for the pilot's own

@@ -179,11 +179,12 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
   for (const std::string& file : files) program += " " + quoted(file);
   std::string body;
   const ingest::Survey& survey = look.survey;
-  body += survey.found
-              ? "<p>The first candidate is used unless options choose another. This is a first look, without a fit of "
-                "each bead. The run may find more beads, and it states their radius with its error. The commands were "
-                "not tried.</p>\n"
-              : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
+  body +=
+      survey.found
+          ? "<p>The first candidate is used unless options choose another. This is a first look, without a fit of "
+            "each bead. The run may find more beads, and it states their radius with its error. It compares channels "
+            "more thoroughly, so it may choose another one. The commands were not tried.</p>\n"
+          : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const std::shared_ptr<const ingest::CandidatePictures> drawn =
       look.picture ? look.picture : std::make_shared<const ingest::CandidatePictures>(look.path, look.page);
   const ingest::CandidatePictures& pictures = *drawn;

@@ -255,6 +255,7 @@ TEST(PreviewPage, HasTheCommandOfEachCandidate) {
   EXPECT_THAT(page, HasSubstr("x&amp;y.pgm</title>"));
   EXPECT_THAT(page, HasSubstr("<p>120 x 60 px. "));
   EXPECT_THAT(page, HasSubstr("The first candidate is used unless options choose another."));
+  EXPECT_THAT(page, HasSubstr("It compares channels more thoroughly, so it may choose another one."));
   for (const char* name : {"preview_1.png", "preview_2.png"}) {
     EXPECT_TRUE(std::filesystem::exists(folder / name));
     EXPECT_THAT(page, HasSubstr(std::string("<img src=\"") + name + "\""));
