@@ -131,7 +131,9 @@ void warn_about_fit(const MeasuredProfile& measured, const FitOptions& options, 
   warn_about_the_window(result);
   if (options.column_number) warn_about_the_sum_rule(result);
   if (!setup.least_squares.free[FitModel::plateau]) return;
-  if (result.plateau_density.std_error > undetermined_plateau * result.plateau_density.value) {
+  // Where nothing depends on it but what also depends on the shift, it has no error, though not all agrees exactly.
+  const bool without_error = !(result.plateau_density.std_error > 0.0) && result.chi2 > 0.0;
+  if (without_error || result.plateau_density.std_error > undetermined_plateau * result.plateau_density.value) {
     result.warnings.emplace_back("the plateau density is not determined: no part of the window lies on the plateau");
   }
   if (result.plateau_density.value >= setup.model->largest_plateau()) {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "fit/profile_fit/answer.hpp"
 #include "fit/profile_fit/chances.hpp"
@@ -51,6 +53,122 @@ TEST(Answer, HasStudentsIntervalOfAPartOfItsUncertainty) {
   ASSERT_GT(part, 0.5);
   EXPECT_NEAR(std::log(few.interval.high / few.temperature) * few.temperature / few.std_error,
               student_quantile(0.975, 4 / std::pow(part, 4)), 1e-9);
+}
+
+// The same column at half as many heights, which takes half of the time.
+AnswerInput half_of(AnswerInput input) {
+  Profile half;
+  for (std::size_t i = 0; i < input.profile.height.size(); i += 2) {
+    half.height.push_back(input.profile.height[i]);
+    half.number_density.push_back(input.profile.number_density[i]);
+    half.std_error.push_back(input.profile.std_error[i]);
+  }
+  input.profile = half;
+  return input;
+}
+
+// Two kinetic temperatures are one up to 20 %, and up to two of their common errors: 0.47 and 0.5640 differ by 20 %.
+TEST(Answer, DoesNotTellKineticTemperaturesApartWithinTwentyPercentOrTwoErrors) {
+  const auto two = [](double z, double error) {
+    AnswerInput input = half_of(column(0.5));
+    input.temperature_x = Estimate{0.47, error, false};
+    input.temperature_z = Estimate{z, error, false};
+    const Answer answer = find_answer(input);
+    EXPECT_EQ(answer.why.starts_with("The disks' velocities have two temperatures"),
+              answer.verdict == Verdict::no_single_temperature)
+        << answer.why;
+    return answer.verdict == Verdict::no_single_temperature;
+  };
+  EXPECT_FALSE(two(0.47 * 1.199, 0.001));
+  EXPECT_TRUE(two(0.47 * 1.201, 0.001));
+  const double apart = 0.47 * 0.201, limit = apart / 2 / std::sqrt(2);
+  EXPECT_TRUE(two(0.47 * 1.201, 0.99 * limit));
+  EXPECT_FALSE(two(0.47 * 1.201, 1.01 * limit));
+}
+
+// So are the profile's and a kinetic one, up to 20 % and three errors.
+TEST(Answer, DoesNotTellProfileAndVelocitiesApartWithinTwentyPercentOrThreeErrors) {
+  AnswerInput input = half_of(column(0.5));
+  const Answer alone = find_answer(input);
+  ASSERT_EQ(alone.verdict, Verdict::one_temperature) << alone.why;
+  const auto chosen = std::find_if(alone.readings.begin(), alone.readings.end(),
+                                   [&](const ThermometerReading& one) { return one.thermometer == alone.thermometer; });
+  const double t = chosen->temperature, own = chosen->std_error;
+  const auto apart = [&](double ratio, double error) {
+    input.temperature_x = input.temperature_z = Estimate{ratio * t, error, false};
+    return find_answer(input).why.find("but the disks' velocities give") != std::string::npos;
+  };
+  EXPECT_FALSE(apart(1.199, 1e-4));
+  EXPECT_TRUE(apart(1.201, 1e-4));
+  ASSERT_LT(3 * own, 0.25 * t) << "else this tests nothing";
+  const double limit = std::sqrt(std::pow(0.25 * t / 3, 2) - own * own);
+  EXPECT_TRUE(apart(1.25, 0.99 * limit));
+  EXPECT_FALSE(apart(1.25, 1.01 * limit));
+}
+
+// How far they are apart is in per cent below a factor of two.
+TEST(Answer, SaysHowFarTemperaturesAreApart) {
+  AnswerInput input = half_of(column(0.5));
+  input.temperature_x = Estimate{0.3, 0.001, false};
+  for (const auto& [z, words] :
+       {std::pair{0.411, "T_z = 0.411 m g D, 37 % apart."}, {0.93, "a factor of 3.1 apart."}}) {
+    input.temperature_z = Estimate{z, 0.001, false};
+    const std::string why = find_answer(input).why;
+    EXPECT_NE(why.find(words), std::string::npos) << why;
+  }
+}
+
+// An interval is a range where its ends are a factor of two apart: at the confidence at which 2 q std_error/T is ln 2.
+TEST(Answer, IsARangeWhereItsEndsAreAFactorOfTwoApart) {
+  AnswerInput input = column(0.06);
+  input.temperature_x = input.temperature_z = Estimate{0.06, 0.01, false};
+  const Answer usual = find_answer(input);
+  ASSERT_TRUE(usual.ok()) << usual.why;
+  const double quantile = 0.5 * std::log(2) * usual.temperature / usual.std_error;
+  for (const double part : {0.99, 1.01}) {
+    input.confidence = 2 * normal_chance(part * quantile) - 1;
+    const Answer answer = find_answer(input);
+    EXPECT_NEAR(answer.interval.high / answer.interval.low, std::pow(2, part), 1e-6);
+    EXPECT_EQ(answer.verdict, part < 1 ? Verdict::one_temperature : Verdict::no_single_temperature) << answer.why;
+    EXPECT_EQ(answer.why.find("spans a factor of 2") != std::string::npos, part > 1) << answer.why;
+  }
+}
+
+// A surface below 0.1 m g D is as uneven as that of a bed at rest.
+TEST(Answer, ShowsATemperatureFromATenthOn) {
+  for (const auto& [temperature, limit] : {std::pair{0.093, true}, {0.11, false}}) {
+    const Answer answer = find_answer(column(temperature));
+    ASSERT_TRUE(answer.ok()) << answer.why;
+    EXPECT_EQ(answer.why.find("T is below") != std::string::npos, limit) << temperature << ": " << answer.why;
+    EXPECT_EQ(answer.interval.low == 0, limit) << temperature;
+  }
+}
+
+// The advice names the largest part of the uncertainty.
+TEST(Answer, SaysWhatWouldReduceItsUncertainty) {
+  const auto advice = [](double noise, double contact) {
+    AnswerInput input = half_of(column(1.0, noise));
+    input.contact_duration_effect = contact;
+    const Answer answer = find_answer(input);
+    EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+    const double model = std::hypot(answer.bias_uncertainty, answer.misfit_error, answer.spread);
+    EXPECT_EQ(answer.advice.find("is statistical") != std::string::npos,
+              answer.statistical_error > std::max(model, answer.contact_duration_uncertainty))
+        << answer.advice;
+    return answer.advice;
+  };
+  EXPECT_NE(advice(0.05, 0).find("is statistical: a longer measurement reduces it"), std::string::npos);
+  EXPECT_NE(advice(0.0005, 0).find("comes from the model: a longer measurement does not"), std::string::npos);
+  EXPECT_NE(advice(0.0005, 0.1).find("comes from the contact duration"), std::string::npos);
+}
+
+// Two reasons may have one cure, which is said once.
+TEST(Answer, SaysOneCureOnce) {
+  AnswerInput input = column(1.0);
+  input.objections = {{"No floor.", "Look."}, {"No beads.", "Look."}, {"No light.", "Wait."}};
+  const Answer answer = find_answer(input);
+  EXPECT_EQ(answer.why, "No floor. No beads. No light.");
+  EXPECT_EQ(answer.advice, "Look. Wait.");
 }
 
 // A kinetic temperature beyond an interval that is too wide widens it further, on its side, and there is no confidence

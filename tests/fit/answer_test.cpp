@@ -234,6 +234,10 @@ TEST(Answer, IsARangeWhereTheVelocitiesHaveTwoTemperatures) {
   EXPECT_THAT(answer.why, testing::HasSubstr("T_x = 0.3 and T_z = 0.6 m g D, a factor of 2 apart"));
   EXPECT_EQ(answer.interval.low, 0.3);
   EXPECT_EQ(answer.interval.high, 0.6);
+  ASSERT_TRUE(answer.temperature_x && answer.temperature_z);
+  EXPECT_EQ(answer.temperature_x->value, 0.3);
+  EXPECT_EQ(answer.temperature_z->value, 0.6);
+  EXPECT_FALSE(find_answer(column(0.5)).temperature_x);
   EXPECT_NEAR(answer.temperature, 0.45, 1e-12);
   // As far apart, but within their errors: no reason to say so.
   input.temperature_x = Estimate{0.42, 0.1, false};
@@ -687,6 +691,9 @@ TEST(KnownBias, IsInterpolatedBetweenTheRowsOfTheTable) {
     EXPECT_NEAR(known_bias(thermometer, middle).scatter, 0.5 * (rows[1].of[t].scatter + rows[2].of[t].scatter), 1e-12);
     EXPECT_EQ(known_bias(thermometer, 1e3).mean, rows.back().of[t].mean);
     EXPECT_NEAR(known_bias(thermometer, 0.5 * rows[0].temperature).scatter, 2.0 * rows[0].of[t].scatter, 1e-12);
+    EXPECT_EQ(known_bias(thermometer, 0.5 * rows[0].temperature).mean, rows[0].of[t].mean);
+    EXPECT_EQ(known_bias(thermometer, 1e3).scatter, rows.back().of[t].scatter);
+    EXPECT_NEAR(known_bias(thermometer, rows.back().temperature * (1 - 1e-9)).mean, rows.back().of[t].mean, 1e-9);
   }
 }
 

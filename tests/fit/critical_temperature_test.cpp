@@ -79,6 +79,41 @@ TEST(CriticalTemperature, ItsErrorIsWhatItScattersBy) {
   EXPECT_NEAR(std::sqrt(squares - sum * sum) / stated, 1.0, 4.0 / std::sqrt(2.0 * draws));
 }
 
+// Points without an error count like the one that is known worst, or all alike, and the crossing then has no error.
+TEST(CriticalTemperature, WithoutErrorsPoolsAllAlike) {
+  const auto crossing = [](double first, double second) {
+    const std::vector<TemperaturePoint> points{{0.1, 1.10, first}, {0.2, 1.13, second}, {0.4, 1.05, 0.0}};
+    return threshold_temperature(points, 1.08);
+  };
+  for (const ThresholdCrossing& one : {crossing(0, 0), crossing(0.02, 0), crossing(0, 0.02)}) {
+    ASSERT_EQ(one.status, ValueStatus::ok);
+    // From (0.15, 1.115), the mean of two, to (0.4, 1.05).
+    EXPECT_NEAR(one.temperature.value, 0.15 + 0.25 * 0.035 / 0.065, 1e-12);
+    EXPECT_EQ(one.temperature.std_error, 0);
+  }
+  // A value at the threshold itself is above it.
+  const std::vector<TemperaturePoint> at{{0.1, 1.15, 0.01}, {0.2, 1.10, 0.01}, {0.3, 1.05, 0.01}};
+  EXPECT_NEAR(threshold_temperature(at, 1.10).temperature.value, 0.2, 1e-12);
+  EXPECT_NEAR(threshold_temperature(at, 1.15).temperature.value, 0.1, 1e-12);
+  EXPECT_EQ(threshold_temperature(at, 1.05).status, ValueStatus::outside_range);
+  const std::vector<TemperaturePoint> negative{{0.1, 1.15, 0.01}, {0.2, 1.10, -0.01}};
+  EXPECT_EQ(threshold_temperature(negative, 1.12).status, ValueStatus::invalid_argument);
+}
+
+// Where none are given thresholds lie a hundredth apart from 1.10 on, and one just below close packing, 1.1547.
+TEST(CriticalTemperature, HasThresholdsUpToClosePacking) {
+  const auto usual = threshold_temperatures({});
+  ASSERT_EQ(usual.size(), 7U);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(usual[i].threshold, 1.10 + 0.01 * static_cast<double>(i), 1e-12);
+  EXPECT_GT(usual.back().threshold, 0.999 * close_packing_density);
+  EXPECT_LT(usual.back().threshold, close_packing_density);
+  const std::vector<double> own{0.9, 0.7};
+  const auto asked = threshold_temperatures(std::vector<TemperaturePoint>{{1, 1, 0.1}, {2, 0.6, 0.1}}, own);
+  ASSERT_EQ(asked.size(), 2U);
+  EXPECT_NEAR(asked[0].temperature.value, 1.25, 1e-12);
+  EXPECT_NEAR(asked[1].temperature.value, 1.75, 1e-12);
+}
+
 TEST(CriticalTemperature, HasAStatusWhereNothingCrosses) {
   const std::vector<TemperaturePoint> points{{0.1, 1.15, 0.0}, {0.2, 1.10, 0.0}};
   EXPECT_EQ(threshold_temperature(points, 1.16).status, ValueStatus::outside_range);

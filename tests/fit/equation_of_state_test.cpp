@@ -51,7 +51,7 @@ TEST(EquationsOfState, HaveTheContactValueOfTheirPressure) {
       EXPECT_EQ(alone.value, 1) << equation->name() << ": two disks alone do not know of others";
     }
     int asked = 0;
-    for (double nu = 0.04; nu < 0.7; nu += 0.03) {
+    for (double nu = 0.04; nu < 0.9; nu += 0.01) {
       const Value z = equation->compressibility_factor(nu_to_phi(nu)), chi = equation->contact_value(nu_to_phi(nu));
       if (!z.ok() || !chi.ok()) continue;
       EXPECT_NEAR(chi.value / ((z.value - 1) / (2 * nu)), 1, 1e-13 + 4e-16 * z.value / (z.value - 1))
@@ -289,6 +289,21 @@ TEST(EquationsOfState, GiveAStatusWhereThereIsNoNumber) {
     EXPECT_EQ(equation->compressibility_factor(1.2).value, 0.0);
     EXPECT_EQ(equation->density_from_f(std::numeric_limits<double>::quiet_NaN()).status, ValueStatus::invalid_argument);
     EXPECT_EQ(equation->compressibility_factor(0.0).value, 1.0);
+    // A gas without disks: an ideal one, whose ln phi has a pole.
+    EXPECT_EQ(equation->stiffness(0.0).value, 1.0);
+    EXPECT_EQ(equation->f(0.0).status, ValueStatus::pole);
+    EXPECT_EQ(equation->pressure(0.0, 2.0).value, 0.0);
+    EXPECT_EQ(equation->density_from_scaled_pressure(0.0).value, 0.0);
+    EXPECT_TRUE(equation->density_from_scaled_pressure(0.0).ok());
+    for (const double number :
+         {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      EXPECT_EQ(equation->pressure(0.5, number).status, ValueStatus::invalid_argument);
+      EXPECT_EQ(equation->density_from_scaled_pressure(number).status, ValueStatus::invalid_argument);
+    }
+    EXPECT_EQ(equation->pressure(0.5, 0.0).value, 0.0);
+    EXPECT_TRUE(equation->pressure(0.5, 0.0).ok());
+    EXPECT_EQ(equation->contact_value(1.2).status, ValueStatus::outside_range);
+    EXPECT_EQ(equation->stiffness(-0.1).status, ValueStatus::invalid_argument);
   }
   EXPECT_EQ(find_equation_of_state("santos-lopez-yuste")->compressibility_factor(close_packing_density).status,
             ValueStatus::pole);

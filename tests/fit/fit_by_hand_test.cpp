@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "fit/inference/posterior.hpp"
@@ -352,6 +353,11 @@ TEST_F(FitWarnings, NameAPlateauThatIsNotDetermined) {
   EXPECT_TRUE(said().empty());
   result_.plateau_density = {1.1, 0.1101, false};
   EXPECT_THAT(said(), ElementsAre(HasSubstr("the plateau density is not determined")));
+  result_.plateau_density = {1.1, 0, false};
+  EXPECT_TRUE(said().empty()) << "a curve that agrees exactly";
+  result_.chi2 = 1e-3;
+  EXPECT_THAT(said(), ElementsAre(HasSubstr("the plateau density is not determined")));
+  result_.chi2 = 0;
   result_.plateau_density = {setup_.model->largest_plateau(), 0.01, false};
   EXPECT_THAT(said(), ElementsAre(HasSubstr("reached close packing")));
   result_.plateau_density = {1.1, 0.01, false}, result_.solid_height = {0, 0, false};
@@ -364,6 +370,18 @@ TEST_F(FitWarnings, NameAPlateauThatIsNotDetermined) {
   result_.model_error = 0.03;
   EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1e-05. A systematic error of 0.03 was "
                                   "added to every density."));
+}
+
+// Above T_c and with T held, another plateau is the same curve with another shift: neither has an error, and the fit
+// says so.
+TEST(WarningsByHand, NameAPlateauThatOnlyMovesTheShift) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.6, {11.22, 1.10});
+  FitOptions options;
+  options.plateau_density = 1.10, options.plateau_density_free = true, options.fixed_temperature = 0.6;
+  options.interval = options.sweep = options.compare = false;
+  const FitResult fit = fit_profile(synthetic::profile_of(truth, {}, 60, synthetic::top_of(truth), 0.005, 3), options);
+  ASSERT_TRUE(fit.ok()) << fit.message;
+  EXPECT_THAT(fit.warnings, testing::Contains(HasSubstr("the plateau density is not determined")));
 }
 
 std::vector<std::string> objections(const Profile& profile, std::optional<double> column = {}, bool velocities = false,
@@ -508,6 +526,88 @@ TEST(SweepByHand, HasItsWindows) {
   EXPECT_NEAR(with.next_bed_interval.low * reach / with.temperature.value, 1, 1e-9);
 }
 
+// What is held in the fit is held in the models beside it that have it: T in all with an equation of state, the shift
+// in the curve over a rectangle. So many parameters each has free.
+TEST(ComparisonByHand, HoldsWhatIsHeld) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.12, {11.22, 1.10});
+  const Profile data = synthetic::profile_of(truth, {}, 60, synthetic::top_of(truth), 0.0005, 3);
+  FitOptions options;
+  options.plateau_density = 1.10;
+  options.interval = options.sweep = false;
+  const auto rows = [&] {
+    std::vector<std::tuple<std::string, int, bool, bool>> out;  // parameters; whether T and the shift are held
+    for (const ModelFit& row : fit_profile(data, options).model_comparison) {
+      EXPECT_EQ(row.status, FitStatus::ok) << row.model;
+      EXPECT_EQ(row.temperature.std_error > 0, !row.temperature.fixed) << row.model;
+      const bool known = row.shift.fixed || row.model == "hydrostatic:best-of";  // its tail begins at the base
+      EXPECT_EQ(row.shift.std_error > 0, !known) << row.model;
+      EXPECT_EQ(row.plateau_density.fixed, !row.plateau_density_free) << row.model;
+      EXPECT_EQ(row.plateau_density.std_error > 0, row.plateau_density_free) << row.model;
+      if (row.temperature.fixed) {
+        EXPECT_EQ(row.temperature.value, row.model == "rectangle" ? 0 : 0.12) << row.model;
+      }
+      if (row.shift.fixed) {
+        EXPECT_EQ(row.shift.value, 4.2) << row.model;
+      }
+      out.emplace_back(row.model, row.parameters, row.temperature.fixed, row.shift.fixed);
+    }
+    return out;
+  };
+  using Rows = std::vector<std::tuple<std::string, int, bool, bool>>;
+  options.fixed_temperature = 0.12;
+  EXPECT_EQ(rows(), (Rows{{"enskog-rectangle", 1, true, false},
+                          {"enskog-rectangle", 2, true, false},
+                          {"hydrostatic:enskog", 1, true, false},
+                          {"hydrostatic:best-of", 1, true, false},
+                          {"fermi", 2, false, false},
+                          {"fermi", 3, false, false},
+                          {"rectangle", 2, true, false}}));
+  options.fixed_temperature.reset();
+  options.fixed_shift = 4.2;
+  EXPECT_EQ(rows(), (Rows{{"enskog-rectangle", 1, false, true},
+                          {"enskog-rectangle", 2, false, true},
+                          {"hydrostatic:enskog", 2, false, false},
+                          {"hydrostatic:best-of", 2, false, false},
+                          {"fermi", 2, false, false},
+                          {"fermi", 3, false, false},
+                          {"rectangle", 2, true, false}}));
+}
+
+// Windows of profiles of few heights: one with fewer than two heights more than parameters is not fitted, and no window
+// is named twice.
+TEST(SweepByHand, LeavesOutWindowsOfTooFewHeights) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 1.0, {11.22, 1.10});
+  FitOptions options;
+  options.plateau_density = 1.10;
+  options.interval = options.compare = false;
+  int just_too_few = 0, just_enough = 0;
+  for (const int heights : {12, 13, 14, 15, 16, 17, 18, 20, 24}) {
+    const Profile data = synthetic::profile_of(truth, {}, heights, synthetic::top_of(truth), 0.0005, 3);
+    options.fixed_shift.reset();
+    const FitResult fit = fit_profile(data, options);
+    options.fixed_shift = fit.shift.value;
+    for (const FitResult& one : {fit, fit_profile(data, options)}) {
+      const bool fixed = one.shift.fixed;
+      const int needed = fixed ? 3 : 4;
+      for (std::size_t i = 0; i < one.window_sweep.size(); ++i) {
+        const WindowFit& row = one.window_sweep[i];
+        const bool fitted = row.status != FitStatus::too_few_bins;
+        EXPECT_EQ(fitted, row.bins >= needed) << heights << ' ' << i;
+        EXPECT_EQ(row.temperature.value > 0, fitted) << heights << ' ' << i;
+        EXPECT_EQ(row.shift.std_error > 0, fitted && !fixed) << heights << ' ' << i;
+        EXPECT_EQ(row.shift.fixed, fixed);
+        EXPECT_FALSE(row.temperature.fixed);
+        if (i > 0) {
+          EXPECT_FALSE(row.low == one.window_sweep[i - 1].low && row.high == one.window_sweep[i - 1].high) << i;
+        }
+        just_too_few += row.bins == needed - 1, just_enough += row.bins == needed;
+      }
+    }
+  }
+  EXPECT_GT(just_too_few, 0);
+  EXPECT_GT(just_enough, 0);
+}
+
 TEST(FitTextByHand, SaysWhatAFitFound) {
   FitResult fit;
   fit.status = FitStatus::ok;
@@ -596,6 +696,24 @@ TEST(LibraryByHand, OfStraightLinesIsExact) {
   EXPECT_NEAR(std::log(poor.temperature.value / 1.2), along / squares, 1e-6);
   EXPECT_NEAR(poor.temperature.std_error, poor.temperature.value * std::sinh(std::sqrt(chi2 / 5) * sigma), 1e-4);
   EXPECT_THAT(poor.warnings, ElementsAre(HasSubstr("no bed of the library describes the data")));
+}
+
+// Beyond its lowest and highest heights a bed of the library holds nothing, and a measurement that reaches farther is
+// compared with that.
+TEST(LibraryByHand, HoldsNothingBeyondItsHeights) {
+  std::vector<SimulatedProfile> library;
+  for (const double t : temperatures) library.push_back({t, straight(t, 0), 0});
+  Profile measured = straight(1.2, 0.01);
+  measured.height.insert(measured.height.begin(), 1.5), measured.height.push_back(7.5);
+  measured.number_density.insert(measured.number_density.begin(), 0.02), measured.number_density.push_back(-0.03);
+  measured.std_error.insert(measured.std_error.begin(), 0.01), measured.std_error.push_back(0.01);
+  const MatchResult match = match_simulated(measured, library);
+  ASSERT_EQ(match.status, FitStatus::ok) << match.message;
+  EXPECT_EQ(match.bins, 8);
+  EXPECT_NEAR(match.temperature.value, 1.2, 1e-6);
+  EXPECT_NEAR(match.density.front(), 0, 1e-12);
+  EXPECT_NEAR(match.density.back(), 0, 1e-12);
+  EXPECT_NEAR(match.chi2, 4 + 9, 1e-6);
 }
 
 // Two runs a temperature, lifted by 0.004 up or down, whose own errors are 0.003: of the variance of one bed about the

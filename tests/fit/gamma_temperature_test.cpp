@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -100,6 +101,65 @@ TEST(GammaMap, RestitutionRaisesTheJumpAndRunsBackwardsToo) {
       EXPECT_LE(g.gamma, 1.35);
     }
   }
+}
+
+// The ball that bounces has the wanted mean height between two Gammas of a table in steps of 2 %. Beyond Gamma = 30
+// nothing is looked for.
+TEST(GammaMap, FindsTheBouncesOfTheWantedHeight) {
+  ShakenBed bed = experiment();
+  bed.restitution = 0.5;
+  for (const double temperature : {0.05, 0.2, 0.6}) {
+    for (const GammaReading& g : gammas_from_temperature(temperature, bed)) {
+      if (!g.name.starts_with("fermi/") || g.status != ValueStatus::ok) continue;
+      const auto kind = std::find_if(jump_heights.begin(), jump_heights.end(),
+                                     [&](JumpHeight one) { return g.name.ends_with(to_string(one)); });
+      const double height = fermi_center_of_mass_rise(temperature, 10.2) / bed.acceleration_length;
+      double low = INFINITY, high = -INFINITY;
+      for (const double gamma : {g.gamma / 1.02, g.gamma, g.gamma * 1.02}) {
+        const double mean = bounce(std::max(1.0, gamma), {.restitution = 0.5, .transient = 200, .flights = 400})
+                                .mean_height[static_cast<std::size_t>(kind - jump_heights.begin())];
+        low = std::min(low, mean), high = std::max(high, mean);
+      }
+      EXPECT_LE(low, height) << g.name << " " << temperature;
+      EXPECT_GE(high, height) << g.name << " " << temperature;
+    }
+  }
+  for (const GammaReading& g : gammas_from_temperature(100, bed)) {
+    EXPECT_EQ(g.status, ValueStatus::outside_range) << g.name;
+    EXPECT_FALSE(g.in_range);
+  }
+}
+
+// A ball may bounce below the highest point of the floor, on average: then no bed rises by that.
+TEST(GammaMap, HasNoTemperatureOfANegativeRise) {
+  int negative = 0;
+  for (const double gamma : {1.02, 1.05, 1.1, 1.2, 1.5}) {
+    ShakenBed bed = experiment();
+    bed.gamma = gamma, bed.restitution = 0.7;
+    const double height = bounce(gamma, {.restitution = 0.7}).mean_height[3];
+    for (const Reading& r : temperatures_from_gamma(bed)) {
+      if (r.jump_height != JumpHeight::above_highest_floor) continue;
+      EXPECT_EQ(r.status, height < 0 ? ValueStatus::outside_range : ValueStatus::ok) << r.name << " " << gamma;
+      EXPECT_EQ(r.temperature > 0, height > 0) << r.name << " " << gamma;
+    }
+    negative += height < 0;
+  }
+  EXPECT_GT(negative, 0) << "else this tests nothing";
+  EXPECT_LT(negative, 5);
+}
+
+TEST(GammaMap, RefusesWhatIsNoTemperatureAndNoLength) {
+  ShakenBed bed = experiment();
+  for (const double temperature : {-0.1, std::nan(""), HUGE_VAL})
+    for (const GammaReading& g : gammas_from_temperature(temperature, bed))
+      EXPECT_EQ(g.status, ValueStatus::invalid_argument) << g.name;
+  for (const double length : {0.0, -1.0, HUGE_VAL}) {
+    bed.acceleration_length = length;
+    for (const Reading& r : temperatures_from_gamma(bed)) EXPECT_EQ(r.status, ValueStatus::invalid_argument);
+    for (const GammaReading& g : gammas_from_temperature(0.1, bed))
+      EXPECT_EQ(g.status, ValueStatus::invalid_argument) << g.name;
+  }
+  EXPECT_NEAR(acceleration_length(9.81, 20, 3e-3), 9.81 / (1600 * M_PI * M_PI) / 3e-3, 1e-12);
 }
 
 TEST(GammaMap, HasAStatusWithoutATc) {

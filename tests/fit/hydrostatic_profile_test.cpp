@@ -38,7 +38,7 @@ TEST(HydrostaticProfile, IsInHydrostaticBalance) {
         const double top = profile.top_of_solid() + 160.0 * t + 60.0 * t;
         const double start = std::max(height, profile.top_of_solid());
         double weight = profile.bottom_density() * std::max(0.0, profile.top_of_solid() - height);
-        const int steps = 400000;
+        const int steps = 40000;
         const double h = (top - start) / steps;
         for (int i = 0; i < steps; ++i) weight += h * profile.density(start + (i + 0.5) * h);
         EXPECT_NEAR(profile.column_above(height), weight, 2e-4) << equation->name() << " " << t << " " << height;

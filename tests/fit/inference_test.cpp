@@ -145,8 +145,16 @@ TEST(Surrogate, DoesNotExtrapolateItsScatter) {
 }
 
 TEST(Surrogate, NeedsRunsEnough) {
-  TrainingSet few = stand_in_runs(10, 0, 1);
-  EXPECT_THROW(Surrogate::train(few), std::invalid_argument);
+  EXPECT_THROW(Surrogate::train(stand_in_runs(19, 0, 1)), std::invalid_argument);
+  TrainingSet runs = stand_in_runs(20, 0, 1);
+  const Surrogate surrogate = Surrogate::train(runs);
+  EXPECT_EQ(surrogate.parameters(), 3U);
+  EXPECT_EQ(surrogate.outputs(), 1U);
+  EXPECT_EQ(surrogate.left_out().size(), 20U);
+  runs.values.pop_back();
+  EXPECT_THROW(Surrogate::train(runs), std::invalid_argument) << "a value is missing";
+  runs.outputs = 0, runs.values.clear();
+  EXPECT_THROW(Surrogate::train(runs), std::invalid_argument) << "nothing to predict";
 }
 
 // A normal likelihood within the cube: mean, deviation and evidence are known.
@@ -206,6 +214,127 @@ TEST(Posterior, SmallToolsDoWhatTheySay) {
     rows.push_back(a), rows.push_back(5 * (0.6 * a + 0.8 * b));
   }
   EXPECT_NEAR(correlation_of(2, rows)[1], 0.6, 0.04);
+}
+
+// The quantile of a value is at the middle of its weight: 0.125, 0.5 and 0.875 here. Between them it is linear, beyond
+// them the outermost value. What has no weight does not count.
+TEST(WeightedQuantile, IsLinearBetweenTheMiddlesOfWeights) {
+  const std::vector<double> values{30, 10, -5, 20, 99}, weights{0.25, 0.25, 0, 0.5, 0};
+  for (const auto& [chance, expected] : {std::pair{0.0, 10.0},
+                                         {0.1, 10.0},
+                                         {0.125, 10.0},
+                                         {0.3125, 15.0},
+                                         {0.5, 20.0},
+                                         {0.575, 22.0},
+                                         {0.6875, 25.0},
+                                         {0.875, 30.0},
+                                         {0.99, 30.0}})
+    EXPECT_NEAR(weighted_quantile(values, weights, chance), expected, 1e-12) << chance;
+  EXPECT_TRUE(std::isnan(weighted_quantile({1, 2}, {0, 0}, 0.5)));
+}
+
+// Deviations 1 and 2 with the correlation 1/2, and errors 3 and 4 of their own: the covariance is 10, 1; 1, 20.
+TEST(CorrelatedErrors, AddTheErrorsThatAreNotCorrelated) {
+  const CorrelatedErrors errors(2, {1, 0.5, 0.5, 1});
+  const std::vector<double> off{1, 2}, deviation{1, 2}, own{3, 4};
+  EXPECT_NEAR(errors(off, deviation, own).chi2, (20 * 1 - 2 * 1 * 1 * 2 + 10 * 4) / 199.0, 1e-13);
+  EXPECT_NEAR(errors(off, deviation, own).log_determinant, std::log(199), 1e-13);
+  const std::vector<double> none{0, 0};
+  EXPECT_EQ(CorrelatedErrors(2, {1, 1.5, 1.5, 1})(off, deviation, none).chi2, INFINITY) << "no correlation";
+}
+
+// Of very many samples it is the normal distribution. Fewer samples have heavier tails, and none has another power
+// where the numbers are no more than the parameters: samples + parameters + 1.
+TEST(EstimatedCovariance, HasTheTailsOfItsSamples) {
+  EXPECT_NEAR(log_likelihood({7, -3}, {100'000'000, 10, 2}), -0.5 * (7 - 3), 1e-5);
+  EXPECT_NEAR(log_likelihood({7, -3}, {30, 2, 2}), -0.5 * (33 * std::log(1 + 7.0 / 29) - 3), 1e-12);
+  EXPECT_NEAR(log_likelihood({7, -3}, {30, 1, 2}), -0.5 * (33 * std::log(1 + 7.0 / 29) - 3), 1e-12);
+  const double two = log_likelihood({7, -3}, {2, 10, 2});
+  EXPECT_EQ(log_likelihood({7, -3}, {0, 10, 2}), two);
+  EXPECT_EQ(log_likelihood({7, -3}, {1, 10, 2}), two);
+  // Between parameters + 3, where the weights' noise is without bound, and samples + parameters + 1, where there is
+  // none.
+  for (const std::size_t samples : {3U, 8U, 14U, 15U, 20U}) {
+    const double lost = log_likelihood({1e6, 0}, {samples, 10, 2}) - log_likelihood({1e3, 0}, {samples, 10, 2});
+    const auto n = static_cast<double>(samples);
+    const double power = -2 * lost / std::log((n - 1 + 1e6) / (n - 1 + 1e3));
+    EXPECT_GT(power, 5) << samples;
+    EXPECT_LT(power, n + 3) << samples;
+  }
+}
+
+// Weights 1/4 and 3/4: variances 3 and 3/4, covariance 3/2, and 1/4 of the measurement's own.
+TEST(ExpectedReduction, IsTheSquareOfACorrelation) {
+  EXPECT_NEAR(expected_reduction({0, 4}, {1, 3}, {0.25, 0.75}, 0.25), 1.5 * 1.5 / (3 * (0.75 + 0.25)), 1e-14);
+  EXPECT_NEAR(expected_reduction({0, 4}, {1, 3}, {0.25, 0.75}, 0), 1, 1e-14);
+  EXPECT_EQ(expected_reduction({4, 4}, {1, 3}, {0.25, 0.75}, 0.25), 0);
+  EXPECT_EQ(expected_reduction({0, 4}, {1, 1}, {0.25, 0.75}, 0), 0);
+}
+
+// A likelihood of e^5 in half of the cube and 0 in the other: half of the even points count, all alike, so the evidence
+// is e^5/2, known to sqrt(1/(n/2) - 1/n).
+TEST(Posterior, OfHalfACubeIsHalfOfItsPoints) {
+  const auto half = [](std::span<const double> points) {
+    std::vector<double> out;
+    for (std::size_t i = 0; i < points.size(); i += 2) out.push_back(points[i] < 0.5 ? 5 : -INFINITY);
+    return out;
+  };
+  SamplingOptions options;
+  options.first = 1024, options.enough = 500;
+  const Posterior found = sample_posterior(2, half, options);
+  EXPECT_EQ(found.rounds, 1);
+  EXPECT_EQ(found.size(), 1024U);
+  EXPECT_NEAR(found.effective, 512, 1.5);
+  EXPECT_NEAR(found.log_evidence, 5 + std::log(0.5), 3e-3);
+  EXPECT_NEAR(found.log_evidence_error, 1.0 / 32, 1e-4);
+  for (std::size_t i = 0; i < found.size(); ++i)
+    EXPECT_NEAR(found.weight[i], found.point(i)[0] < 0.5 ? 1.0 / 512 : 0, 5e-6);
+  // Nowhere above 0: no round helps.
+  const Posterior none = sample_posterior(
+      2, [](std::span<const double> points) { return std::vector<double>(points.size() / 2, -INFINITY); }, options);
+  EXPECT_EQ(none.effective, 0);
+  EXPECT_EQ(none.rounds, 1);
+  EXPECT_EQ(none.weight, std::vector<double>(1024, 0.0));
+  // As many further rounds as are allowed, and no more.
+  options.enough = 1e9, options.most_rounds = 3, options.further = 200;
+  const Posterior more = sample_posterior(2, half, options);
+  EXPECT_EQ(more.rounds, 4);
+  EXPECT_EQ(more.size(), 200U);
+}
+
+TEST(EvenPoints, FillTheCubeOfOneToFortyDimensions) {
+  for (const std::size_t dimensions : {1U, 3U, 40U}) {
+    const std::vector<double> points = even_points(dimensions, 256, 5);
+    ASSERT_EQ(points.size(), 256 * dimensions);
+    for (std::size_t k = 0; k < dimensions; ++k) {
+      std::array<int, 4> quarter{};
+      for (std::size_t i = 0; i < 256; ++i) {
+        const double at = points[i * dimensions + k];
+        ASSERT_TRUE(at >= 0 && at < 1);
+        ++quarter[static_cast<std::size_t>(4 * at)];
+      }
+      for (const int count : quarter) EXPECT_NEAR(count, 64, 2) << k;
+    }
+    EXPECT_NE(even_points(dimensions, 1, 6), even_points(dimensions, 1, 5));
+  }
+  EXPECT_THROW(even_points(0, 4, 1), std::invalid_argument);
+  EXPECT_THROW(even_points(41, 4, 1), std::invalid_argument);
+}
+
+// Each is drawn within one of its share, whatever the offset; a sum that rounding left below 1 lacks none.
+TEST(EqualDraws, AreAsManyAsAskedFor) {
+  const std::vector<double> weights{0.13, 0.4, 0, 0.27, 0.2};
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const std::vector<std::size_t> draws = equal_draws(weights, 10, seed);
+    ASSERT_EQ(draws.size(), 10U);
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const auto drawn = static_cast<double>(std::count(draws.begin(), draws.end(), i));
+      EXPECT_LT(std::abs(drawn - 10 * weights[i]), 1 - 1e-9) << i;
+    }
+    EXPECT_EQ(equal_draws({0.5, 0.2}, 10, seed).size(), 10U);
+    EXPECT_EQ(equal_draws({0.5, 0.2}, 10, seed).back(), 1U);
+  }
+  EXPECT_TRUE(equal_draws({0, 0}, 4, 1).empty());
 }
 
 // Three numbers of twelve runs, each in units of its own scatter about its own mean; all correlations are less by what

@@ -82,6 +82,13 @@ TEST(JumpHeight, IsInverted) {
       EXPECT_NEAR(gamma_for_jump_height(kind, height).value / gamma, 1.0, 1e-9) << to_string(kind) << " " << gamma;
     }
   }
+  for (const WaveForm& wave : {WaveForm::sine(), WaveForm::series("harmonic", {{2, 1.0, 0.0}})}) {
+    for (const double height : {-0.1, HUGE_VAL, std::nan("")})
+      EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_launch, height, wave).status, ValueStatus::invalid_argument);
+  }
+  EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_launch, 1e13).status, ValueStatus::outside_range);
+  EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_launch, 1, WaveForm::series("flat", {})).status,
+            ValueStatus::invalid_argument);
   // Above the mean floor the ball is at least Gamma = 1 high as soon as it leaves.
   EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_mean_floor, 0.5).status, ValueStatus::outside_range);
 }
@@ -101,6 +108,62 @@ TEST(WaveForm, IsScaledToItsPeakAcceleration) {
   EXPECT_EQ(WaveForm::series("flat", {{1, 0.0, 0.0}}).status(), ValueStatus::invalid_argument);
   EXPECT_EQ(jump_height(JumpHeight::relative_max, 3.0, WaveForm::series("flat", {})).status,
             ValueStatus::invalid_argument);
+}
+
+// Position, velocity, acceleration and jerk by differences of one another; the bounds hold, and the highest point is
+// that of a fine scan.
+TEST(WaveForm, HasTheDerivativesOfItsPosition) {
+  const WaveForm wave = WaveForm::series("mixed", {{1, 1.0, 0.3}, {2, 0.2, -0.1}, {5, -0.01, 0.02}});
+  EXPECT_EQ(wave.highest_order(), 5);
+  EXPECT_FALSE(wave.pure_sine());
+  double highest = -1e9, jerk = 0, snap = 0;
+  const double h = 1e-4;
+  for (double phase = 0; phase < 2 * pi; phase += 1e-3) {
+    const auto slope = [&](double (WaveForm::*of)(double) const) {
+      return ((wave.*of)(phase + h) - (wave.*of)(phase - h)) / (2 * h);
+    };
+    EXPECT_NEAR(wave.velocity(phase), slope(&WaveForm::position), 1e-6);
+    EXPECT_NEAR(wave.acceleration(phase), slope(&WaveForm::velocity), 1e-6);
+    EXPECT_NEAR(wave.jerk(phase), slope(&WaveForm::acceleration), 1e-5);
+    highest = std::max(highest, wave.position(phase));
+    jerk = std::max(jerk, std::abs(wave.jerk(phase)));
+    snap = std::max(snap, std::abs(slope(&WaveForm::jerk)));
+    const double t = 0.3, start = wave.position(phase), by = wave.velocity(phase), twice = wave.acceleration(phase);
+    EXPECT_NEAR(wave.deviation(phase, t), wave.position(phase + t) - start - by * t - 0.5 * twice * t * t, 1e-14);
+    EXPECT_NEAR(wave.deviation_rate(phase, t), wave.velocity(phase + t) - by - twice * t, 1e-14);
+  }
+  EXPECT_NEAR(wave.highest(), highest, 1e-6);
+  EXPECT_GE(wave.largest_jerk(), jerk);
+  EXPECT_LT(wave.largest_jerk(), 2 * jerk);
+  EXPECT_GE(wave.largest_snap(), snap);
+  EXPECT_LT(wave.largest_snap(), 2 * snap);
+  EXPECT_EQ(WaveForm::series("none", {{0, 1, 0}}).status(), ValueStatus::invalid_argument);
+  EXPECT_EQ(WaveForm::series("none", {{1, std::nan(""), 0}}).status(), ValueStatus::invalid_argument);
+  EXPECT_EQ(WaveForm::series("none", {{1, 0, INFINITY}}).status(), ValueStatus::invalid_argument);
+}
+
+// Of three points a period's first harmonic is known, of fewer none; of 2 k + 1 points the k-th. More orders than were
+// asked for are left out.
+TEST(WaveForm, OfFewSamplesHasTheHarmonicsThatTheyTell) {
+  const auto sampled = [](std::size_t count, int orders) {
+    std::vector<double> positions;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double phase = 2 * pi * static_cast<double>(i) / static_cast<double>(count);
+      positions.push_back(std::sin(phase) + 0.1 * std::sin(2 * phase));
+    }
+    return WaveForm::samples("few", positions, orders);
+  };
+  EXPECT_EQ(sampled(2, 8).status(), ValueStatus::invalid_argument);
+  EXPECT_EQ(sampled(3, 8).highest_order(), 1);
+  EXPECT_EQ(sampled(4, 8).highest_order(), 1);
+  EXPECT_EQ(sampled(5, 8).highest_order(), 2);
+  EXPECT_EQ(sampled(9, 8).highest_order(), 4);
+  EXPECT_EQ(sampled(64, 1).highest_order(), 1);
+  const WaveForm same = WaveForm::series("same", {{1, 1, 0}, {2, 0.1, 0}});
+  for (const double phase : {0.1, 1.0, 2.7, 5.0}) {
+    EXPECT_NEAR(sampled(5, 8).position(phase), same.position(phase), 1e-12);
+    EXPECT_NEAR(sampled(64, 1).position(phase), std::sin(phase), 1e-12);
+  }
 }
 
 TEST(WaveForm, FromSamplesIsTheSampledMotion) {
@@ -134,6 +197,71 @@ TEST(Bounce, DeadBallFliesAsSteppedIntegrationSays) {
       EXPECT_NEAR(s.mean_height[i], jump_height(jump_heights[i], gamma).value, 1e-8);
     }
   }
+}
+
+// A dead ball that jumps once a period flies for a part of it and rests for the remainder. All its jumps are alike.
+TEST(Bounce, DeadBallRestsForTheRemainderOfThePeriod) {
+  for (const double gamma : {1.05, 1.5, 2.0, 3.0}) {
+    const BounceStatistics s = bounce(gamma, {.restitution = 0.0, .transient = 20, .flights = 10});
+    ASSERT_EQ(s.flight_times.size(), 10U);
+    ASSERT_EQ(s.launch_phases.size(), 10U);
+    EXPECT_NEAR(s.mean_flight, s.flight_times.back() / (2 * pi), 1e-9);
+    EXPECT_NEAR(s.resting_fraction, 1 - s.mean_flight, 1e-8) << gamma;
+    for (std::size_t i = 0; i < jump_heights.size(); ++i) EXPECT_NEAR(s.greatest_height[i], s.mean_height[i], 1e-8);
+  }
+}
+
+// Heights are weighed by the time of their flights, and their greatest one is that of one of the flights. In the orbit
+// of two flights beyond the doubling the apex above the launch follows from each flight's own velocity.
+TEST(Bounce, WeighsItsHeightsByTheTimeOfFlight) {
+  const double gamma = 4.0;
+  const BounceStatistics s = bounce(gamma, {.restitution = 0.0, .transient = 5000, .flights = 256});
+  ASSERT_EQ(s.period, 2);
+  double weighted = 0, time = 0, greatest = 0, least = 1e9;
+  for (std::size_t i = 0; i < s.flight_times.size(); ++i) {
+    const double velocity = gamma * std::cos(s.launch_phases[i]), rise = 0.5 * velocity * velocity;
+    weighted += s.flight_times[i] * rise, time += s.flight_times[i];
+    greatest = std::max(greatest, rise), least = std::min(least, rise);
+  }
+  EXPECT_GT(greatest, 1.1 * least);
+  EXPECT_NEAR(s.mean_height[1], weighted / time, 1e-7);
+  EXPECT_NEAR(s.greatest_height[1], greatest, 1e-7);
+  EXPECT_NEAR(s.mean_flight, time / 256 / (2 * pi), 1e-9);
+}
+
+// The second mode flies for two periods, from twice the Gamma of the first; of a dead ball the first begins at pi and
+// doubles at sqrt(4 + pi^2).
+TEST(Bounce, HasModesOfSeveralPeriods) {
+  EXPECT_NEAR(period_one_mode(1, 0).exists_from, pi, 1e-14);
+  EXPECT_NEAR(period_one_mode(1, 0).stable_to, std::sqrt(4 + pi * pi), 1e-14);
+  for (const double e : {0.0, 0.3, 0.8}) {
+    const ModeRange first = period_one_mode(1, e), third = period_one_mode(3, e);
+    EXPECT_NEAR(third.exists_from, 3 * first.exists_from, 1e-13);
+    EXPECT_NEAR(third.stable_to * third.stable_to - first.stable_to * first.stable_to,
+                8 * first.exists_from * first.exists_from, 1e-11);
+  }
+  const ModeRange second = period_one_mode(2, 0.5);
+  const double gamma = 0.5 * (second.exists_from + second.stable_to);
+  BounceOptions options{.restitution = 0.5, .transient = 2000, .flights = 64};
+  options.initial_phase = std::acos(second.exists_from / gamma) + 1e-3;
+  options.initial_velocity = 4 * pi * 0.5 / 1.5;
+  const BounceStatistics s = bounce(gamma, options);
+  EXPECT_EQ(s.period, 1);
+  EXPECT_NEAR(s.mean_flight, 2, 1e-6);
+  EXPECT_EQ(s.resting_fraction, 0);
+}
+
+TEST(Bounce, RefusesWhatIsNoBall) {
+  const auto status = [](double gamma, const BounceOptions& options) { return bounce(gamma, options).status; };
+  EXPECT_EQ(status(2, {.flights = 1}), ValueStatus::ok);
+  EXPECT_EQ(status(2, {.transient = 0, .flights = 1}), ValueStatus::ok);
+  EXPECT_EQ(status(2, {.flights = 0}), ValueStatus::invalid_argument);
+  EXPECT_EQ(status(2, {.transient = -1}), ValueStatus::invalid_argument);
+  EXPECT_EQ(status(-0.1, {}), ValueStatus::invalid_argument);
+  EXPECT_EQ(status(std::nan(""), {}), ValueStatus::invalid_argument);
+  EXPECT_EQ(status(2, {.initial_phase = INFINITY}), ValueStatus::invalid_argument);
+  EXPECT_EQ(status(2, {.initial_velocity = -1}), ValueStatus::invalid_argument);
+  EXPECT_EQ(bounce(2, {}, WaveForm::series("flat", {})).status, ValueStatus::invalid_argument);
 }
 
 TEST(Bounce, OnAHarmonicAloneFliesAsOnAFasterSine) {

@@ -42,6 +42,25 @@ TEST(PowerProduct, WidensErrorsWhereThePointsScatter) {
   EXPECT_NEAR(fit.rms_log_ratio, std::sqrt((1.0 / 36 + 1.0 / 9 + 1.0 / 36) / 3), 1e-12);
 }
 
+// ln x = -1, 0, 1: the amplitude is the mean of ln y, of three points with errors of 0.02, and widened as the exponent
+// is. Of ln y = 0, 1, 3 the mean is 4/3; chi2 of one degree of freedom is (1/6)/0.02^2.
+TEST(PowerProduct, HasTheErrorOfItsAmplitude) {
+  const double e = std::exp(1);
+  const std::vector<std::vector<double>> x{{1 / e, 1, e}};
+  const std::vector<double> exact{2 / e, 2, 2 * e}, error{0.04 / e, 0.04, 0.04 * e};
+  const PowerProduct good = fit_power_product(x, exact, error);
+  EXPECT_NEAR(good.log_amplitude, std::log(2), 1e-12);
+  EXPECT_NEAR(good.log_amplitude_error, 0.02 / std::sqrt(3), 1e-12);
+  EXPECT_NEAR(good.p_value, 1, 1e-9);
+  ASSERT_EQ(good.group_log_amplitude.size(), 1U);
+  const std::vector<double> bent{1, e, e * e * e};
+  const PowerProduct poor = fit_power_product(x, bent, std::vector<double>{0.2, 0.2 * e, 0.2 * e * e * e});
+  EXPECT_NEAR(poor.log_amplitude, 4.0 / 3, 1e-12);
+  const double chi2 = 1 / 6.0 / 0.04;
+  EXPECT_NEAR(poor.log_amplitude_error, 0.2 / std::sqrt(3) * std::sqrt(chi2), 1e-9);
+  EXPECT_NEAR(poor.p_value, std::erfc(std::sqrt(chi2 / 2)), 1e-9) << "two sides of a normal distribution";
+}
+
 TEST(PowerProduct, NeedsPositiveAndIndependentNumbers) {
   const std::vector<double> y{1, 2, 3, 4}, error(4, 0.1);
   EXPECT_FALSE(fit_power_product({{1, 2, 3, 4}, {1, 4, 9, 16}}, y, error).ok) << "x and x^2";

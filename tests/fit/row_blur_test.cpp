@@ -61,6 +61,55 @@ TEST(RowBlur, GoesByTheMomentsOfTheKernel) {
   }
 }
 
+// Heights that are not evenly spaced own half the way to either neighbour: a density that does not change stays, and
+// one that rises evenly does, far from both ends.
+TEST(RowBlur, KeepsAStraightLineAtUnevenHeights) {
+  Profile profile;
+  double height = 0;
+  for (int i = 0; i < 120; ++i) {
+    height += i < 60 ? 0.25 : 0.1;
+    profile.height.push_back(height);
+    profile.number_density.push_back(0.2 + 0.05 * height);
+    profile.std_error.push_back(0.1);
+  }
+  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
+  EXPECT_EQ(blurred.kernel.width, 0.5);
+  for (std::size_t i = 10; i < 98; ++i)
+    EXPECT_NEAR(blurred.profile.number_density[i] / profile.number_density[i], 1, 0.01) << i;
+}
+
+// Samples behind a covariance stay; errors of single heights count as of as many samples as there are heights. What is
+// common to all heights stays common to them.
+TEST(RowBlur, KeepsTheSamplesOfACovariance) {
+  Profile profile = flat(60, 0, 0.25);
+  EXPECT_EQ(blur_rows(profile, {}, 0.0).profile.covariance_samples, 60);
+  profile.covariance.assign(3600, 0.04);
+  profile.covariance_samples = 33;
+  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
+  EXPECT_EQ(blurred.profile.covariance_samples, 33);
+  EXPECT_NEAR(blurred.profile.std_error[30], 0.2, 1e-3) << "of the covariance, not of the errors beside it";
+  EXPECT_NEAR(blurred.profile.covariance[30 * 60 + 22], 0.04, 1e-3);
+  profile.covariance_samples = 0;
+  EXPECT_EQ(blur_rows(profile, {}, 0.0).profile.covariance_samples, 60);
+}
+
+// Up to one diameter above the lower edge a profile is taken for whole. From there on what its first heights lack is
+// left out, and their covariance with the others, too: four widths of the blur, eight heights of a quarter each.
+TEST(RowBlur, LeavesOutTheHeightsBesideACut) {
+  Profile profile = flat(50, 1.0, 0.25);
+  for (std::size_t i = 0; i < 50; ++i) profile.std_error[i] = 0.1 + 0.002 * static_cast<double>(i);
+  const Profile whole = blur_rows(profile, {}, 0.0).profile, cut = blur_rows(profile, {}, -0.01).profile;
+  ASSERT_EQ(whole.height.size(), 50U);
+  ASSERT_EQ(cut.height.size(), 42U);
+  ASSERT_EQ(cut.covariance.size(), 42U * 42U);
+  for (std::size_t i = 0; i < 42; ++i) {
+    EXPECT_EQ(cut.height[i], whole.height[i + 8]);
+    EXPECT_EQ(cut.number_density[i], whole.number_density[i + 8]);
+    EXPECT_EQ(cut.std_error[i], whole.std_error[i + 8]);
+    for (std::size_t j = 0; j < 42; ++j) EXPECT_EQ(cut.covariance[i * 42 + j], whole.covariance[(i + 8) * 50 + j + 8]);
+  }
+}
+
 TEST(RowBlur, LeavesAloneWhatItMustNotTouch) {
   const Profile profile = flat(50, 0, 0.25);
   const Kernel wide{KernelKind::gaussian, 0.5};

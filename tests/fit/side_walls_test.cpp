@@ -56,5 +56,40 @@ TEST(SideWalls, ChangeErrorsAsDensitiesAndKeepTheNumberOfDisks) {
   EXPECT_EQ(profile.covariance_samples, 7);
 }
 
+// Walls that leave no room for a disk, and profiles that are no profiles, are left as they are: fits say what is wrong.
+// Without errors there are none to change.
+TEST(SideWalls, LeaveAloneWhatIsNoProfile) {
+  const Profile plain{{0, 1, 2}, {0.3, 0.6, 0.3}, {0.01, 0.02}, {}, 0};
+  std::optional<double> column = 1.0;
+  for (const double width : {0.5, 1.0}) {
+    Profile same = plain;
+    take_far_from_walls(same, width, column);
+    EXPECT_EQ(same.number_density, plain.number_density) << width;
+  }
+  Profile broken = plain;
+  broken.height.pop_back();
+  take_far_from_walls(broken, 10, column);
+  EXPECT_EQ(broken.number_density, plain.number_density);
+  EXPECT_EQ(column, 1.0);
+  Profile changed = plain;
+  std::optional<double> none;
+  take_far_from_walls(changed, 10, none);
+  EXPECT_GT(changed.number_density[0], 0.3);
+  EXPECT_NE(changed.std_error[1], 0.02);
+  EXPECT_EQ(changed.std_error.size(), 2U);
+  EXPECT_TRUE(changed.covariance.empty());
+  EXPECT_FALSE(none);
+  // Nothing under the curve: the number of disks is as given.
+  Profile empty{{0, 1, 2}, {0, 0, 0}, {}, {}, 0};
+  take_far_from_walls(empty, 10, column);
+  EXPECT_EQ(column, 1.0);
+  // The area is that of trapezia between heights that are not evenly spaced: 0.3, then 2 (0.3 + 0.6)/2, then 0.45.
+  Profile uneven{{0, 1, 3, 4}, {0.3, 0.3, 0.6, 0.3}, {}, {}, 0};
+  std::optional<double> uneven_column = 0.3 + 0.9 + 0.45;
+  take_far_from_walls(uneven, 10, uneven_column);
+  const double low = density_far_from_walls(0.3, 10), high = density_far_from_walls(0.6, 10);
+  EXPECT_NEAR(*uneven_column, low + (low + high) + 0.5 * (low + high), 1e-13);
+}
+
 }  // namespace
 }  // namespace shakebed::fit

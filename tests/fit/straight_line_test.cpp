@@ -67,6 +67,58 @@ TEST(PowerLaw, SaysWhenThereIsNone) {
   EXPECT_FALSE(fit_given_power(std::vector<double>{1}, std::vector<double>{1}, std::vector<double>{1}, 2, true).ok);
 }
 
+// Twelve points that scatter by 4 % in turn, up and down, with stated errors of 1 % and of 0.5 %: what is stated of
+// the exponent is by the scatter, the same for both. With errors of 100 % it is by them, proportional to them.
+TEST(PowerLaw, WidensItsErrorWhereThePointsScatter) {
+  std::vector<double> x, y;
+  for (int i = 0; i < 12; ++i) {
+    x.push_back(1 + 0.4 * i);
+    y.push_back(2 * std::pow(x.back(), 1.5) * (i % 4 == 0 || i % 4 == 3 ? 1.04 : 0.96));
+  }
+  const auto at = [&](double relative) {
+    std::vector<double> error;
+    for (const double one : x) error.push_back(2 * relative * std::pow(one, 1.5));
+    return fit_power_law(x, y, error, false);
+  };
+  const PowerLaw one = at(0.01), half = at(0.005), large = at(0.1), larger = at(0.2);
+  ASSERT_TRUE(one.ok && half.ok && large.ok && larger.ok);
+  EXPECT_NEAR(half.chi2 / one.chi2, 4, 1e-5);
+  EXPECT_EQ(one.dof, 10);
+  EXPECT_LT(one.p_value, 1e-10);
+  EXPECT_NEAR(one.p_value, chance_of_chi2(one.chi2, 10), 1e-15);
+  EXPECT_NEAR(half.exponent_error / one.exponent_error, 1, 2e-3);
+  EXPECT_NEAR(larger.exponent_error / large.exponent_error, 2, 4e-2);
+  EXPECT_GT(larger.p_value, 0.9);
+  EXPECT_NEAR(one.exponent_error / large.exponent_error, std::sqrt(one.chi2 / 10) * 0.1, 2e-2);
+}
+
+// Exponents are looked for from 0.1 to 6, and the interval must close between them. With as many points as unknowns
+// nothing is left to widen the error by.
+TEST(PowerLaw, LooksForExponentsUpToSix) {
+  const auto of = [](double exponent) {
+    const std::vector<double> x{0.7, 0.8, 0.9, 1, 1.2};
+    std::vector<double> y;
+    for (const double one : x) y.push_back(std::pow(one, exponent));
+    return fit_power_law(x, y, std::vector<double>(5, 0.001), false);
+  };
+  for (const double exponent : {0.2, 1.0, 3.33, 5.9}) {
+    ASSERT_TRUE(of(exponent).ok) << exponent;
+    EXPECT_NEAR(of(exponent).exponent, exponent, 1e-5);
+  }
+  EXPECT_FALSE(of(0.05).ok);
+  EXPECT_FALSE(of(6.1).ok);
+  const std::vector<double> two{1, 2}, three{1, 2, 3};
+  const PowerLaw through = fit_power_law(two, std::vector<double>{1, 4}, std::vector<double>{0.1, 0.1}, false);
+  ASSERT_TRUE(through.ok);
+  EXPECT_EQ(through.dof, 0);
+  EXPECT_EQ(through.p_value, 1);
+  EXPECT_NEAR(through.exponent, 2, 1e-6);
+  // The amplitude from 1, 0.1 uncertain, the exponent from the ratio: sqrt(0.1^2 + (0.1/4)^2)/ln 2.
+  EXPECT_NEAR(through.exponent_error, std::hypot(0.1, 0.025) / std::log(2), 2e-3);
+  EXPECT_FALSE(fit_power_law(two, two, std::vector<double>{1, 1}, true).ok) << "three unknowns";
+  EXPECT_TRUE(fit_power_law(three, std::vector<double>{1.5, 4.5, 9.5}, std::vector<double>(3, 0.1), true).ok);
+}
+
 // A given power by hand: y = A x^2 through (1, 1) and (2, 5), equal errors: A = (1 + 20)/17.
 TEST(PowerLaw, OfAGivenPowerIsDoneByHand) {
   const PowerLaw law =

@@ -226,7 +226,10 @@ TEST(StatedError, MissesWhatWasAskedWhereMoreThanChanceIsBetween) {
   EXPECT_FALSE(misses(0.0193, 0.01, 4));
   EXPECT_TRUE(misses(0.0125, 0.01, 100));
   EXPECT_FALSE(misses(0.0115, 0.01, 100));
+  EXPECT_TRUE(misses(0.0259, 0.01, 2)) << "6.635 of one degree: 2.576 times the error";
+  EXPECT_FALSE(misses(0.0256, 0.01, 2));
   EXPECT_TRUE(misses(0.0101, 0.01, 1)) << "one bed: nothing is known of its scatter";
+  EXPECT_FALSE(misses(0.01, 0.01, 1));
 }
 
 TEST(NextPilot, IsAsLongAsTheChoiceUpToWhatTells) {

@@ -293,6 +293,8 @@ TEST(StudyDoneByHand, NamesItsMistakes) {
     return study.told;
   };
   EXPECT_EQ(told(options(R"({ "values": [] })", critical)), "/parameter/values: the list of values is empty");
+  for (const char* replicas : {"0", "1001"})
+    EXPECT_THAT(told(options(gammas, critical, ", \"replicas\": " + std::string(replicas))), HasSubstr("/replicas: "));
   EXPECT_EQ(told(options(gammas, "{}")), "/collect: \"collect\" is empty: give at least one number");
   EXPECT_EQ(told(options(gammas, critical, R"(, "second": { "name": "g", "values": [] })")),
             "/second/name: both parameters have the same name | /second/values: the list of values is empty");

@@ -43,6 +43,18 @@ TEST(CorrelatedSeries, HasAMemoryDoneByHand) {
   EXPECT_DOUBLE_EQ(memory_of(std::span(series).first(8)), 1 + 2 * 5.0 / 8);
 }
 
+// As many up as down: values d apart agree in count - 3 d more pairs than they differ in. Only distances below a
+// quarter of the series are asked.
+TEST(CorrelatedSeries, AsksNoFartherThanAQuarterOfTheSeries) {
+  for (const std::size_t count : {4U, 6U, 8U, 12U, 14U, 16U, 20U, 28U}) {
+    std::vector<double> series(count, 1.0);
+    for (std::size_t i = count / 2; i < count; ++i) series[i] = -1;
+    double sum = 0;
+    for (std::size_t d = 1; d < count / 4; ++d) sum += static_cast<double>(count) - 3.0 * static_cast<double>(d);
+    EXPECT_DOUBLE_EQ(memory_of(series), 1 + 2 * sum / static_cast<double>(count)) << count;
+  }
+}
+
 // Two peaks six values apart: what lies beyond five memories, here five values, is not asked.
 TEST(CorrelatedSeries, AsksNoFartherThanFiveMemories) {
   std::vector<double> series(40, 0.0);

@@ -302,6 +302,11 @@ TEST(TimeLeft, HasAFractionFromItsBeginningOn) {
   EXPECT_EQ(time.fraction(), 0);
   now = 10.5;
   EXPECT_NEAR(time.fraction(), 0.5 / 4, 1e-12);
+  TimeLeft at_once(1, 1, [&] { return now; });  // done before any time has passed
+  at_once.expect(0, 2);
+  at_once.begin(0);
+  at_once.end(0);
+  EXPECT_EQ(at_once.fraction(), 0);
   TimeLeft unknown(1, 1, [&] { return now; });
   now = 20;
   ASSERT_FALSE(unknown.seconds());
