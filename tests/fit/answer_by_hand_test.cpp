@@ -55,22 +55,10 @@ TEST(Answer, HasStudentsIntervalOfAPartOfItsUncertainty) {
               student_quantile(0.975, 4 / std::pow(part, 4)), 1e-9);
 }
 
-// The same column at half as many heights, which takes half of the time.
-AnswerInput half_of(AnswerInput input) {
-  Profile half;
-  for (std::size_t i = 0; i < input.profile.height.size(); i += 2) {
-    half.height.push_back(input.profile.height[i]);
-    half.number_density.push_back(input.profile.number_density[i]);
-    half.std_error.push_back(input.profile.std_error[i]);
-  }
-  input.profile = half;
-  return input;
-}
-
 // Two kinetic temperatures are one up to 20 %, and up to two of their common errors: 0.47 and 0.5640 differ by 20 %.
 TEST(Answer, DoesNotTellKineticTemperaturesApartWithinTwentyPercentOrTwoErrors) {
   const auto two = [](double z, double error) {
-    AnswerInput input = half_of(column(0.5));
+    AnswerInput input = every(2, column(0.5));
     input.temperature_x = Estimate{0.47, error, false};
     input.temperature_z = Estimate{z, error, false};
     const Answer answer = find_answer(input);
@@ -88,7 +76,7 @@ TEST(Answer, DoesNotTellKineticTemperaturesApartWithinTwentyPercentOrTwoErrors) 
 
 // So are the profile's and a kinetic one, up to 20 % and three errors.
 TEST(Answer, DoesNotTellProfileAndVelocitiesApartWithinTwentyPercentOrThreeErrors) {
-  AnswerInput input = half_of(column(0.5));
+  AnswerInput input = every(2, column(0.5));
   const Answer alone = find_answer(input);
   ASSERT_EQ(alone.verdict, Verdict::one_temperature) << alone.why;
   const auto chosen = std::find_if(alone.readings.begin(), alone.readings.end(),
@@ -108,7 +96,7 @@ TEST(Answer, DoesNotTellProfileAndVelocitiesApartWithinTwentyPercentOrThreeError
 
 // How far they are apart is in per cent below a factor of two.
 TEST(Answer, SaysHowFarTemperaturesAreApart) {
-  AnswerInput input = half_of(column(0.5));
+  AnswerInput input = every(2, column(0.5));
   input.temperature_x = Estimate{0.3, 0.001, false};
   for (const auto& [z, words] :
        {std::pair{0.411, "T_z = 0.411 m g D, 37 % apart."}, {0.93, "a factor of 3.1 apart."}}) {
@@ -147,7 +135,7 @@ TEST(Answer, ShowsATemperatureFromATenthOn) {
 // The advice names the largest part of the uncertainty.
 TEST(Answer, SaysWhatWouldReduceItsUncertainty) {
   const auto advice = [](double noise, double contact) {
-    AnswerInput input = half_of(column(1.0, noise));
+    AnswerInput input = every(2, column(1.0, noise));
     input.contact_duration_effect = contact;
     const Answer answer = find_answer(input);
     EXPECT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;

@@ -173,6 +173,24 @@ TEST(Answer, HasTheErrorOfTheScale) {
   EXPECT_EQ(known.advice.find("the scale"), std::string::npos) << known.advice;
 }
 
+// Errors that come from the scale alone, rounded in a file so that they are a little less than its part: what is left
+// of the variances is no negative number.
+TEST(Answer, SurvivesErrorsThatAreThoseOfTheScaleAlone) {
+  AnswerInput input = with_scale_error(every(3, column(1.0, 0.02)), 0.02);
+  const std::size_t n = input.profile.height.size();
+  const std::vector<double>& density = input.profile.number_density;
+  for (std::size_t a = 0; a < n; ++a) {
+    input.profile.std_error[a] = 2 * 0.02 * std::abs(density[a]) * (1 - 1e-9);
+    for (std::size_t b = 0; b < n; ++b)
+      input.profile.covariance[a * n + b] = 4 * 0.02 * 0.02 * density[a] * density[b] * (1 - 1e-9);
+  }
+  const Answer by_covariance = find_answer(input);
+  EXPECT_NE(by_covariance.status, FitStatus::bad_input) << by_covariance.why;
+  input.profile.covariance.clear();
+  const Answer by_errors = find_answer(input);
+  EXPECT_NE(by_errors.status, FitStatus::bad_input) << by_errors.why;
+}
+
 // With a diameter 60 % larger, disks would cover more than the plane: no fit exists, and T is uncertain by a factor of
 // e.
 TEST(Answer, IsUncertainByAFactorOfEWhereAFitWithAnotherScaleFails) {

@@ -242,6 +242,136 @@ TEST(WeightsByHand, OfFewSamplesAreSmoothErrors) {
   EXPECT_NEAR(more.inverse_error[8], 1, 1e-14);
 }
 
+// Correlations of 0.9, -0.9 and 0.9 between three heights contradict one another: the matrix is positive definite only
+// where each is below 5/9 of itself. All are reduced alike, and not by much more than is needed.
+TEST(WeightsByHand, OfAnImpossibleCovarianceAreReduced) {
+  MeasuredProfile measured = with_covariance({1, 2, 4}, 0, 0);
+  const double correlation[3][3] = {{1, 0.9, -0.9}, {0.9, 1, 0.9}, {-0.9, 0.9, 1}};
+  for (Eigen::Index i = 0; i < 3; ++i)
+    for (Eigen::Index j = 0; j < 3; ++j)
+      measured.covariance(i, j) =
+          correlation[i][j] * measured.error[static_cast<std::size_t>(i)] * measured.error[static_cast<std::size_t>(j)];
+  FitResult result;
+  const Bins bins = bins_of(measured, {0, 9, ""}, &result);
+  const Eigen::MatrixXd used = bins.whitening * bins.whitening.transpose();
+  const double kept = used(0, 1) / measured.covariance(0, 1);
+  EXPECT_LT(kept, 5.0 / 9);
+  EXPECT_GT(kept, 1 - 1.5 * 4.0 / 9) << "within half of what is needed";
+  for (Eigen::Index i = 0; i < 3; ++i)
+    for (Eigen::Index j = 0; j < 3; ++j)
+      EXPECT_NEAR(used(i, j), (i == j ? 1 : kept) * measured.covariance(i, j), 1e-12) << i << j;
+  EXPECT_THAT(
+      result.warnings,
+      ElementsAre("the covariance of the densities is not positive definite: its correlations were reduced by " +
+                  number(100 * (1 - kept), 2) + " %"));
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// options and profiles that cannot be fitted
+
+TEST(FitMistakes, OfOptionsAreNamed) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  const auto told = [](const auto& change, FitStatus expected = FitStatus::bad_input) {
+    FitOptions options;
+    change(options);
+    FitResult result;
+    EXPECT_EQ(check_options(options, result), expected) << result.message;
+    return result.message;
+  };
+  const auto nothing = [](FitOptions&) {};
+  EXPECT_EQ(told(nothing, FitStatus::ok), "");
+  for (const double bad : {0.0, -1.0, none, infinite}) {
+    EXPECT_THAT(told([&](FitOptions& o) { o.plateau_density = bad; }), HasSubstr("the plateau density phi_0 is "));
+    EXPECT_THAT(told([&](FitOptions& o) { o.column_number = bad; }), HasSubstr("the column number N D/W is "));
+    EXPECT_THAT(told([&](FitOptions& o) { o.fixed_temperature = bad; }), HasSubstr("the fixed temperature is "));
+  }
+  for (const double bad : {none, infinite}) {
+    EXPECT_THAT(told([&](FitOptions& o) { o.fixed_shift = bad; }), HasSubstr("the fixed shift is not a finite"));
+    EXPECT_THAT(told([&](FitOptions& o) { o.base = bad; }), HasSubstr("the base (height"));
+    EXPECT_THAT(told([&](FitOptions& o) { o.kernel = {KernelKind::gaussian, bad}; }), HasSubstr("width of the kernel"));
+  }
+  EXPECT_THAT(told([](FitOptions& o) { o.kernel = {KernelKind::top_hat, -0.1}; }), HasSubstr("width of the kernel"));
+  EXPECT_EQ(told([](FitOptions& o) { o.kernel = {KernelKind::top_hat, 0}; }, FitStatus::ok), "");
+  for (const double bad : {0.0, 1.0, -0.5, none})
+    EXPECT_THAT(told([&](FitOptions& o) { o.confidence = bad; }), HasSubstr("it must lie between 0 and 1"));
+  for (const double good : {0.001, 0.999}) told([&](FitOptions& o) { o.confidence = good; }, FitStatus::ok);
+  EXPECT_THAT(told([](FitOptions& o) { o.model = "hydrostatic:enskog", o.fixed_shift = 3; }),
+              HasSubstr("give the column number instead"));
+  EXPECT_EQ(told([](FitOptions& o) { o.fixed_shift = -3; }, FitStatus::ok), "");
+  EXPECT_THAT(told([](FitOptions& o) { o.constrain_column = true; }), HasSubstr("needs the column number N D/W"));
+  EXPECT_EQ(told([](FitOptions& o) { o.constrain_column = true, o.column_number = 10; }, FitStatus::ok), "");
+  EXPECT_EQ(told([](FitOptions& o) { o.model = "gauss"; }), "there is no model named 'gauss'");
+  EXPECT_THAT(told([](FitOptions& o) { o.plateau_density = 1.1548; }, FitStatus::undefined_model),
+              HasSubstr("is above close packing"));
+  told([](FitOptions& o) { o.plateau_density = close_packing_density * (1 + 1e-13); }, FitStatus::ok);
+}
+
+// Where the rule leaves too few heights, all above the base are used and it is said; a window that was asked for is
+// kept.
+TEST(FitMistakes, OfAWindowRuleAreMadeGood) {
+  Profile profile;
+  profile.height = {-0.5, 0.2, 0.6, 1.0, 1.4, 1.8, 2.2};
+  profile.number_density = {0.3, 0.95, 0.6, 0.3, 0.12, 0.05, 0.0};
+  profile.std_error.assign(7, 0.02);
+  FitOptions options;
+  options.interval = options.sweep = options.compare = false;
+  const FitResult all = fit_profile(profile, options);
+  EXPECT_EQ(all.bins, 6) << all.message;
+  EXPECT_EQ(all.window_low, 0.2);
+  EXPECT_EQ(all.window_high, 2.2);
+  // The rule takes 1.8 and 2.2 D: what lies higher than 1.5 D, up to one diameter beyond a cliff.
+  EXPECT_THAT(all.warnings, testing::Contains("the window rule leaves only 2 bins, too few for the fit: all bins above "
+                                              "the base (lower edge of the bed) were used"));
+  options.window.low = 1.5;
+  const FitResult asked = fit_profile(profile, options);
+  EXPECT_EQ(asked.status, FitStatus::too_few_bins);
+  EXPECT_THAT(asked.message, HasSubstr("2 free parameters need at least 3"));
+}
+
+// A profile is flat where one number describes it: densities that go up and down by one error do not fall, those that
+// do so by three errors are no constant. Without errors, a billionth is no fall.
+TEST(FitMistakes, OfAProfileThatDoesNotFallAreNamed) {
+  const auto status = [](double swing, double error, double fall) {
+    Profile profile;
+    for (int i = 0; i < 20; ++i) {
+      profile.height.push_back(i);
+      profile.number_density.push_back(0.5 + (i % 2 == 0 ? swing : -swing) - fall * i / 19);
+      if (error > 0) profile.std_error.push_back(error);
+    }
+    FitOptions options;
+    options.interval = options.sweep = options.compare = false;
+    options.window.low = 0, options.window.high = 20;
+    return fit_profile(profile, options).status;
+  };
+  EXPECT_EQ(status(0.05, 0.05, 0), FitStatus::no_tail);
+  EXPECT_NE(status(0.05, 0.0166, 0), FitStatus::no_tail);
+  EXPECT_NE(status(0.05, 0.05, 0.4), FitStatus::no_tail) << "it falls by eight errors";
+  EXPECT_EQ(status(0, 0, 4e-10), FitStatus::no_tail);
+  EXPECT_NE(status(0, 0, 0.01), FitStatus::no_tail);
+  EXPECT_NE(status(0.05, 0, 0), FitStatus::no_tail) << "without errors nothing tells";
+}
+
+// What was done to a profile before it is fitted.
+TEST(FitMistakes, OfAProfileAreMadeGoodAndSaid) {
+  Profile profile;
+  profile.height = {3, 1, 2}, profile.number_density = {0.1, 1, 0.5};
+  const auto said = [&] {
+    FitResult result;
+    const MeasuredProfile measured = measured_of(profile, result);
+    EXPECT_THAT(measured.height, ElementsAre(1, 2, 3));
+    EXPECT_THAT(measured.density, ElementsAre(1, 0.5, 0.1));
+    EXPECT_FALSE(measured.errors_known);
+    EXPECT_THAT(measured.error, ElementsAre(1, 1, 1));
+    return result.warnings;
+  };
+  const std::string weights = ": every bin has the same weight, and the errors of the fit follow from the residuals";
+  EXPECT_THAT(said(), ElementsAre("the heights were not in ascending order; the bins were sorted",
+                                  "no standard errors were given" + weights));
+  profile.std_error = {0, 0, 0};
+  EXPECT_THAT(said(), ElementsAre("the heights were not in ascending order; the bins were sorted",
+                                  "all standard errors are zero" + weights));
+}
+
 // ---------------------------------------------------------------------------------------------------------------------
 // warnings and objections: both sides of each limit
 
@@ -714,6 +844,35 @@ TEST(LibraryByHand, HoldsNothingBeyondItsHeights) {
   EXPECT_NEAR(match.density.front(), 0, 1e-12);
   EXPECT_NEAR(match.density.back(), 0, 1e-12);
   EXPECT_NEAR(match.chi2, 4 + 9, 1e-6);
+}
+
+// Three heights are enough, two are not; a bed like the coldest or the hottest of the library may lie beyond it.
+TEST(LibraryByHand, HasItsLimits) {
+  std::vector<SimulatedProfile> library;
+  for (const double t : temperatures) library.push_back({t, straight(t, 0), 0});
+  const Profile measured = straight(1.2, 0.01);
+  EXPECT_EQ(match_simulated(measured, library, {.low = 2, .high = 3}).status, FitStatus::too_few_bins);
+  const MatchResult three = match_simulated(measured, library, {.low = 2, .high = 4});
+  EXPECT_EQ(three.status, FitStatus::ok);
+  EXPECT_EQ(three.dof, 2);
+  for (const double end : {0.5, 2.2}) {
+    const MatchResult match = match_simulated(straight(end == 0.5 ? 0.48 : 2.3, 0.01), library);
+    EXPECT_EQ(match.status, FitStatus::unresolved_temperature);
+    EXPECT_THAT(match.message, HasSubstr("at an end of the library"));
+    EXPECT_EQ(match.interval.low_open, end == 0.5);
+    EXPECT_EQ(match.interval.high_open, end == 2.2);
+    EXPECT_NEAR(match.temperature.value, end, 1e-9);
+  }
+  Profile unsorted = measured;
+  std::swap(unsorted.height[1], unsorted.height[2]);
+  EXPECT_EQ(match_simulated(unsorted, library).status, FitStatus::bad_input);
+  Profile negative = measured;
+  negative.std_error[2] = -0.01;
+  EXPECT_EQ(match_simulated(negative, library).status, FitStatus::bad_input);
+  negative.std_error.pop_back();
+  EXPECT_EQ(match_simulated(negative, library).status, FitStatus::bad_input);
+  library[1].temperature = -1;
+  EXPECT_EQ(match_simulated(measured, library).status, FitStatus::bad_input);
 }
 
 // Two runs a temperature, lifted by 0.004 up or down, whose own errors are 0.003: of the variance of one bed about the

@@ -328,6 +328,12 @@ TEST(FitProfile, TakesAnErrorOfTheModelThatIsKnownBeforehand) {
   EXPECT_DOUBLE_EQ(with.model_error, 0.01);
   EXPECT_GT(with.temperature.std_error, plain.temperature.std_error);
   EXPECT_DOUBLE_EQ(with.chi2, plain.chi2) << "by the measured errors alone";
+  // Errors that are not known follow from the residuals, which have it in them.
+  Profile bare = good;
+  bare.std_error.clear();
+  const FitResult residuals = fit_profile(bare, options);
+  EXPECT_EQ(residuals.model_error, 0.0);
+  EXPECT_EQ(residuals.temperature.std_error, fit_profile(bare, core_options(1.10)).temperature.std_error);
   Profile bad = good;
   for (std::size_t i = 0; i < bad.height.size(); ++i)
     bad.number_density[i] += 0.1 * std::sin(2.0 * bad.height[i]) * std::min(1.0, 5.0 * bad.number_density[i]);
@@ -461,6 +467,13 @@ TEST(FitHardCases, ThreeBinsAreEnoughAndTwoAreNot) {
   ASSERT_EQ(fit.status, FitStatus::ok) << fit.message;
   EXPECT_NEAR(fit.temperature.value, 0.5, 1e-6);
   EXPECT_FALSE(any_number_is_not_finite(fit));
+  // So they are for other models of two parameters; one with a free plateau has three.
+  FitOptions without_column;
+  without_column.plateau_density = 1.10;
+  for (const ModelFit& row : fit_profile(data, without_column).model_comparison) {
+    const bool three = row.plateau_density_free && row.model != "rectangle";
+    EXPECT_EQ(row.status == FitStatus::too_few_bins, three) << row.model;
+  }
   data.height.pop_back();
   data.number_density.pop_back();
   data.std_error.pop_back();

@@ -184,6 +184,16 @@ TEST(Frames, GiveAStatusForNonsense) {
   EXPECT_EQ(average_frames(frames).status, FitStatus::bad_input);
   EXPECT_EQ(bootstrap_fit(frames, plain_options(), {}).status, FitStatus::bad_input);
   EXPECT_EQ(average_frames(make_frames(1, 0.0, 0.1, 1)).status, FitStatus::bad_input);
+  const ProfileFrames good = make_frames(4, 0.0, 0.1, 1);
+  for (const BootstrapOptions& bad : {BootstrapOptions{.resamples = 9}, BootstrapOptions{.confidence = 0},
+                                      BootstrapOptions{.confidence = 1}, BootstrapOptions{.confidence = -0.5}})
+    EXPECT_EQ(bootstrap_fit(good, plain_options(), bad).status, FitStatus::bad_input);
+  EXPECT_EQ(bootstrap_fit(good, plain_options(), {.resamples = 10}).status, FitStatus::ok);
+  ProfileFrames broken = good;
+  broken.number_density[70] = std::nan("");
+  EXPECT_EQ(average_frames(broken).status, FitStatus::bad_input);
+  broken = good, broken.height[3] = HUGE_VAL;
+  EXPECT_EQ(average_frames(broken).status, FitStatus::bad_input);
   EXPECT_EQ(bootstrap_fit(make_frames(1, 0.0, 0.1, 1), plain_options(), {}).status, FitStatus::bad_input);
 }
 
