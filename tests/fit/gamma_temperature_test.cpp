@@ -88,6 +88,8 @@ TEST(GammaMap, RunsBackwards) {
   }
 }
 
+// The way back leads to a Gamma between two of a table in steps of 2 %, whose balls bounce to heights about the wanted
+// one.
 TEST(GammaMap, RestitutionRaisesTheJumpAndRunsBackwardsToo) {
   ShakenBed bed = experiment();
   bed.gamma = 1.3;
@@ -95,45 +97,33 @@ TEST(GammaMap, RestitutionRaisesTheJumpAndRunsBackwardsToo) {
   const auto readings = temperatures_from_gamma(bed);
   const Reading r = reading(readings, "eq6/relative_max");
   ASSERT_EQ(r.status, ValueStatus::ok);
+  const double wanted = fermi_center_of_mass_rise(r.temperature, 10.2) / bed.acceleration_length;
+  int asked = 0;
   for (const GammaReading& g : gammas_from_temperature(r.temperature, bed)) {
     if (g.name == r.name) {
       ASSERT_EQ(g.status, ValueStatus::ok);
       EXPECT_LE(g.gamma, 1.35);
     }
-  }
-}
-
-// The ball that bounces has the wanted mean height between two Gammas of a table in steps of 2 %. Beyond Gamma = 30
-// nothing is looked for.
-TEST(GammaMap, FindsTheBouncesOfTheWantedHeight) {
-  ShakenBed bed = experiment();
-  bed.restitution = 0.5;
-  for (const double temperature : {0.05, 0.2, 0.6}) {
-    for (const GammaReading& g : gammas_from_temperature(temperature, bed)) {
-      if (!g.name.starts_with("fermi/") || g.status != ValueStatus::ok) continue;
-      const auto kind = std::find_if(jump_heights.begin(), jump_heights.end(),
-                                     [&](JumpHeight one) { return g.name.ends_with(to_string(one)); });
-      const double height = fermi_center_of_mass_rise(temperature, 10.2) / bed.acceleration_length;
-      double low = INFINITY, high = -INFINITY;
-      for (const double gamma : {g.gamma / 1.02, g.gamma, g.gamma * 1.02}) {
-        const double mean = bounce(std::max(1.0, gamma), {.restitution = 0.5, .transient = 200, .flights = 400})
-                                .mean_height[static_cast<std::size_t>(kind - jump_heights.begin())];
-        low = std::min(low, mean), high = std::max(high, mean);
-      }
-      EXPECT_LE(low, height) << g.name << " " << temperature;
-      EXPECT_GE(high, height) << g.name << " " << temperature;
+    if (!g.name.starts_with("fermi/") || g.status != ValueStatus::ok) continue;
+    const auto kind = std::find_if(jump_heights.begin(), jump_heights.end(),
+                                   [&](JumpHeight one) { return g.name.ends_with(to_string(one)); });
+    double low = INFINITY, high = -INFINITY;
+    for (const double gamma : {g.gamma / 1.02, g.gamma, g.gamma * 1.02}) {
+      const double mean = bounce(std::max(1.0, gamma), {.restitution = 0.5, .transient = 200, .flights = 400})
+                              .mean_height[static_cast<std::size_t>(kind - jump_heights.begin())];
+      low = std::min(low, mean), high = std::max(high, mean);
     }
+    EXPECT_LE(low, wanted) << g.name;
+    EXPECT_GE(high, wanted) << g.name;
+    ++asked;
   }
-  for (const GammaReading& g : gammas_from_temperature(100, bed)) {
-    EXPECT_EQ(g.status, ValueStatus::outside_range) << g.name;
-    EXPECT_FALSE(g.in_range);
-  }
+  EXPECT_GT(asked, 1);
 }
 
 // A ball may bounce below the highest point of the floor, on average: then no bed rises by that.
 TEST(GammaMap, HasNoTemperatureOfANegativeRise) {
   int negative = 0;
-  for (const double gamma : {1.02, 1.05, 1.1, 1.2, 1.5}) {
+  for (const double gamma : {1.05, 1.5}) {
     ShakenBed bed = experiment();
     bed.gamma = gamma, bed.restitution = 0.7;
     const double height = bounce(gamma, {.restitution = 0.7}).mean_height[3];
@@ -145,7 +135,7 @@ TEST(GammaMap, HasNoTemperatureOfANegativeRise) {
     negative += height < 0;
   }
   EXPECT_GT(negative, 0) << "else this tests nothing";
-  EXPECT_LT(negative, 5);
+  EXPECT_LT(negative, 2);
 }
 
 TEST(GammaMap, RefusesWhatIsNoTemperatureAndNoLength) {
