@@ -502,25 +502,34 @@ TEST(RimsOfShadings, AreAtTheRadiusForEachShape) {
       {"parabola", [](double rho) { return 1 - rho * rho; }},
       {"cone", [](double rho) { return 1 - rho; }},
       {"quartic", [](double rho) { return (1 - rho * rho) * (1 - rho * rho); }}};
-  for (const auto& [name, shape] : shapes) {
-    BeadProfile profile;
-    profile.step_px = 0.05;
-    const RadialContrast lit = [&](double rho) { return 0.5 + 0.5 * shape(std::min(rho, 1.0)); };
-    for (int k = 0; k <= 300; ++k)
-      profile.level.push_back(static_cast<float>(blurred_disk_contrast(10, 1.1, lit, 0.05 * k)));
-    const RimChoice choice = choose_rim(profile, {.radius_px = 10.1,
-                                                  .edge_px = 1.2,
-                                                  .knot_px = 0.4,
-                                                  .noise = 1e-3,
-                                                  .beads = 1e6,
-                                                  .background_level = 200,
-                                                  .bead_level = 60,
-                                                  .linear_only = true});
-    EXPECT_TRUE(choice.rim.good) << name;
-    EXPECT_NEAR(choice.rim.radius_px, 10, 2e-3) << name;
-    EXPECT_NEAR(choice.rim.edge_px, 1.1, 5e-3) << name;
-    EXPECT_LT(choice.rim.misfit, 1e-4) << name;
-  }
+  const auto level_of = [](double light) { return 255 * std::pow(light, 0.45); };
+  const double outside = level_of(0.9), inside = level_of(0.05);
+  for (const auto& [name, shape] : shapes)
+    for (const bool encoded : {false, true}) {
+      SCOPED_TRACE(name + (encoded ? " encoded for display" : ""));
+      BeadProfile profile;
+      profile.step_px = 0.05;
+      const double share = encoded ? 0.2 : 0.5;  // of the shape; more of it may pass for a tone curve
+      const RadialContrast lit = [&](double rho) { return 1 - share + share * shape(std::min(rho, 1.0)); };
+      for (int k = 0; k <= 300; ++k) {
+        const double contrast = blurred_disk_contrast(10, 1.1, lit, 0.05 * k);
+        const double level = (level_of(0.9 - 0.85 * contrast) - outside) / (inside - outside);
+        profile.level.push_back(static_cast<float>(encoded ? level : contrast));
+      }
+      const RimChoice choice = choose_rim(profile, {.radius_px = 10.1,
+                                                    .edge_px = 1.2,
+                                                    .knot_px = 0.4,
+                                                    .noise = 1e-3,
+                                                    .beads = 1e6,
+                                                    .background_level = encoded ? outside : 200,
+                                                    .bead_level = encoded ? inside : 60,
+                                                    .linear_only = !encoded});
+      EXPECT_TRUE(choice.rim.good);
+      EXPECT_EQ(choice.exponent, encoded ? 0.45 : 1);
+      EXPECT_NEAR(choice.rim.radius_px, 10, 2e-3);
+      EXPECT_NEAR(choice.rim.edge_px, 1.1, 5e-3);
+      EXPECT_LT(choice.rim.misfit, 1e-4);
+    }
 }
 
 // Levels encoded for display are distinguished from linear ones, but only where this is asked for.
