@@ -46,7 +46,7 @@ bool natural_less(const std::string& a, const std::string& b) {
       i = i_end;
       j = j_end;
     } else {
-      if (a[i] != b[j]) return a[i] < b[j];
+      if (a[i] != b[j]) return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
       ++i;
       ++j;
     }

@@ -10,6 +10,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -392,6 +393,50 @@ TEST(BeadAsymmetry, OutlineIsTheCircleOnWhichTheBeadEnds) {
   }
 }
 
+// A bead that is turned by quarters has its outline, and what is seen from beside its centre, turned with it: no
+// direction counts for more than the others.
+TEST(BeadAsymmetry, TurnsWithItsBead) {
+  const auto turned = [](int quarters) {
+    BeadAsymmetry::Harmonics harmonics;
+    harmonics.step_px = harmonic_step;
+    for (std::size_t m = 0; m < 6; ++m)
+      for (int k = 0; k < 36; ++k) {
+        // Of a shape of m + 1 periods a turn, strongest at the rim; the amplitudes of its cosine and its sine.
+        const double rim = std::exp(-std::pow((k * harmonic_step - 9) / 1.5, 2)) * (k < 34);
+        const double c = 0.12 * rim * test::scattered(static_cast<int>(m), 1),
+                     s = 0.12 * rim * (test::scattered(2, static_cast<int>(m)) - 0.5);
+        const double angle = quarters * static_cast<double>(m + 1) * std::numbers::pi / 2;
+        harmonics.cosine[m].push_back(c * std::cos(angle) - s * std::sin(angle));
+        harmonics.sine[m].push_back(c * std::sin(angle) + s * std::cos(angle));
+      }
+    BeadProfile profile = test::blurred_profile(9, 1.1, 14, 0.05);
+    profile.asymmetry = std::make_shared<const BeadAsymmetry>(harmonics);
+    return profile;
+  };
+  const auto turn = [](double x, double y, int quarters) {
+    for (int k = 0; k < quarters; ++k) std::tie(x, y) = std::pair(-y, x);
+    return std::pair(x, y);
+  };
+  const Outline plain = outline_of(turned(0), 9.1, 1.1);
+  ASSERT_TRUE(plain.good);
+  EXPECT_GT(std::hypot(plain.x_px, plain.y_px), 0.02);
+  const BeadProfile beside = recentred(turned(0), 0.3, -0.7);
+  for (const int quarters : {1, 2, 3}) {
+    const Outline outline = outline_of(turned(quarters), 9.1, 1.1);
+    const auto [x, y] = turn(plain.x_px, plain.y_px, quarters);
+    EXPECT_NEAR(outline.x_px, x, 1e-6) << quarters;
+    EXPECT_NEAR(outline.y_px, y, 1e-6) << quarters;
+    EXPECT_NEAR(outline.radius_px, plain.radius_px, 1e-6) << quarters;
+    const auto [by_x, by_y] = turn(0.3, -0.7, quarters);
+    const BeadProfile moved = recentred(turned(quarters), by_x, by_y);
+    for (std::size_t k = 0; k < moved.level.size(); ++k) ASSERT_NEAR(moved.level[k], beside.level[k], 1e-5F) << k;
+    for (double r = 0.5; r < 13; r += 1.1) {
+      const auto [u, v] = turn(r * 0.8, r * 0.6, quarters);
+      ASSERT_NEAR(moved.asymmetry->at(u, v), beside.asymmetry->at(r * 0.8, r * 0.6), 1e-6) << quarters << ' ' << r;
+    }
+  }
+}
+
 // --- rims ------------------------------------------------------------------------------------------------------------
 
 // Profiles without noise: flat, a ball's light, and with a parabola; sharp ones as square pixels see them on average.
@@ -502,25 +547,34 @@ TEST(RimsOfShadings, AreAtTheRadiusForEachShape) {
       {"parabola", [](double rho) { return 1 - rho * rho; }},
       {"cone", [](double rho) { return 1 - rho; }},
       {"quartic", [](double rho) { return (1 - rho * rho) * (1 - rho * rho); }}};
-  for (const auto& [name, shape] : shapes) {
-    BeadProfile profile;
-    profile.step_px = 0.05;
-    const RadialContrast lit = [&](double rho) { return 0.5 + 0.5 * shape(std::min(rho, 1.0)); };
-    for (int k = 0; k <= 300; ++k)
-      profile.level.push_back(static_cast<float>(blurred_disk_contrast(10, 1.1, lit, 0.05 * k)));
-    const RimChoice choice = choose_rim(profile, {.radius_px = 10.1,
-                                                  .edge_px = 1.2,
-                                                  .knot_px = 0.4,
-                                                  .noise = 1e-3,
-                                                  .beads = 1e6,
-                                                  .background_level = 200,
-                                                  .bead_level = 60,
-                                                  .linear_only = true});
-    EXPECT_TRUE(choice.rim.good) << name;
-    EXPECT_NEAR(choice.rim.radius_px, 10, 2e-3) << name;
-    EXPECT_NEAR(choice.rim.edge_px, 1.1, 5e-3) << name;
-    EXPECT_LT(choice.rim.misfit, 1e-4) << name;
-  }
+  const auto level_of = [](double light) { return 255 * std::pow(light, 0.45); };
+  const double outside = level_of(0.9), inside = level_of(0.05);
+  for (const auto& [name, shape] : shapes)
+    for (const bool encoded : {false, true}) {
+      SCOPED_TRACE(name + (encoded ? " encoded for display" : ""));
+      BeadProfile profile;
+      profile.step_px = 0.05;
+      const double share = encoded ? 0.2 : 0.5;  // of the shape; more of it may pass for a tone curve
+      const RadialContrast lit = [&](double rho) { return 1 - share + share * shape(std::min(rho, 1.0)); };
+      for (int k = 0; k <= 300; ++k) {
+        const double contrast = blurred_disk_contrast(10, 1.1, lit, 0.05 * k);
+        const double level = (level_of(0.9 - 0.85 * contrast) - outside) / (inside - outside);
+        profile.level.push_back(static_cast<float>(encoded ? level : contrast));
+      }
+      const RimChoice choice = choose_rim(profile, {.radius_px = 10.1,
+                                                    .edge_px = 1.2,
+                                                    .knot_px = 0.4,
+                                                    .noise = 1e-3,
+                                                    .beads = 1e6,
+                                                    .background_level = encoded ? outside : 200,
+                                                    .bead_level = encoded ? inside : 60,
+                                                    .linear_only = !encoded});
+      EXPECT_TRUE(choice.rim.good);
+      EXPECT_EQ(choice.exponent, encoded ? 0.45 : 1);
+      EXPECT_NEAR(choice.rim.radius_px, 10, 2e-3);
+      EXPECT_NEAR(choice.rim.edge_px, 1.1, 5e-3);
+      EXPECT_LT(choice.rim.misfit, 1e-4);
+    }
 }
 
 // Levels encoded for display are distinguished from linear ones, but only where this is asked for.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -120,6 +121,66 @@ TEST(BedGeometry, TheFloorsMotionIsThatOfWhatTouchesIt) {
   EXPECT_FALSE(find_floor_motion({frames.begin(), frames.begin() + 3}, 20, 0.13).known);
 }
 
+// The floor that bottoms press on, by least squares with weights that fall off as a Gaussian of the gap to it; what
+// lies below counts in full. Repeated until nothing changes.
+std::array<double, 3> floor_through(const std::vector<LowestBottoms>& frames, double turns_per_frame,
+                                    double tolerance) {
+  std::array<double, 3> floor = {300, 6, 0};  // middle, sine, cosine
+  for (int round = 0; round < 80; ++round) {
+    std::vector<std::vector<double>> normal(3, std::vector<double>(3, 0.0));
+    std::array<double, 3> right{};
+    for (const LowestBottoms& frame : frames)
+      for (const double y : frame.y) {
+        const double angle = 2 * std::numbers::pi * turns_per_frame * static_cast<double>(frame.frame);
+        const std::array<double, 3> row = {1, -std::sin(angle), -std::cos(angle)};
+        const double gap = floor[0] * row[0] + floor[1] * row[1] + floor[2] * row[2] - y;
+        const double weight = gap > 0 ? std::exp(-std::pow(gap / tolerance, 2)) : 1;
+        for (std::size_t a = 0; a < 3; ++a) {
+          right[a] += weight * row[a] * y;
+          for (std::size_t b = 0; b < 3; ++b) normal[a][b] += weight * row[a] * row[b];
+        }
+      }
+    const auto inverse = test::inverse_of(normal);
+    for (std::size_t a = 0; a < 3; ++a)
+      floor[a] = inverse[a][0] * right[0] + inverse[a][1] * right[1] + inverse[a][2] * right[2];
+  }
+  return floor;
+}
+
+// Beads come as near as 0 to 3 px to a floor that moves. With tolerances of 4 % and 2 % of a diameter the fit lies
+// above it by a share of each: from both follows where it is, and the error states 0.4 of that last step and the
+// scatter of what touches, which is nearer than 4 %.
+TEST(BedGeometry, TheFloorsErrorIsThatOfItsToleranceAndScatter) {
+  std::vector<LowestBottoms> frames;
+  for (std::size_t k = 0; k < 60; ++k) {
+    const double floor = 300 - 6 * std::sin(2 * std::numbers::pi * 0.17 * static_cast<double>(k));
+    LowestBottoms& one = frames.emplace_back();
+    one.frame = k;
+    for (int column = 0; column < 6; ++column)
+      one.y.push_back(floor - 3 * std::pow(test::scattered(column, static_cast<int>(k)), 2));
+  }
+  const auto wide = floor_through(frames, 0.17, 0.8), narrow = floor_through(frames, 0.17, 0.4);
+  const double middle = 2 * narrow[0] - wide[0], sine = 2 * narrow[1] - wide[1], cosine = 2 * narrow[2] - wide[2];
+  double squares = 0;
+  std::size_t touching = 0;
+  for (const LowestBottoms& frame : frames)
+    for (const double y : frame.y) {
+      const double angle = 2 * std::numbers::pi * 0.17 * static_cast<double>(frame.frame);
+      const double gap = middle - sine * std::sin(angle) - cosine * std::cos(angle) - y;
+      if (gap < 0.8) ++touching, squares += gap * gap;
+    }
+  const FloorMotion motion = find_floor_motion(frames, 20, 0.17);
+  EXPECT_TRUE(motion.known);
+  EXPECT_EQ(motion.touching, touching);
+  EXPECT_GT(middle - narrow[0], 0.03) << "there is something to extrapolate";
+  EXPECT_NEAR(motion.middle, middle, 2e-3);
+  EXPECT_NEAR(motion.amplitude, std::hypot(sine, cosine), 2e-3);
+  const double scatter = std::sqrt(squares) / static_cast<double>(touching), step = 0.4 * (middle - narrow[0]);
+  EXPECT_GT(scatter, 0.3 * step);
+  EXPECT_NEAR(motion.middle_std_error, std::hypot(scatter, step), 1e-3);
+  EXPECT_EQ(motion.amplitude_std_error, motion.middle_std_error);
+}
+
 // --- bed_geometry.hpp ------------------------------------------------------------------------------------------------
 
 FilmCalibration film_of(int width, int height) {
@@ -212,7 +273,8 @@ TEST(BedGeometry, AScaleThatNothingShowsIsDoubted) {
     const auto warnings = find_geometry(film, frames, refined, bed);
     return std::pair(bed, warnings);
   };
-  EXPECT_TRUE(found(2e-3 / 20.3).second.empty());
+  for (const double within : {19.62, 20.39}) EXPECT_TRUE(found(2e-3 / within).second.empty()) << within;
+  for (const double beyond : {19.59, 20.43}) EXPECT_EQ(found(2e-3 / beyond).second.size(), 1U) << beyond;
   const auto wrong = found(2e-3 / 24);
   ASSERT_EQ(wrong.second.size(), 1U);
   EXPECT_TRUE(holds(wrong.second[0], "a bead is 24 px wide, but the beads found are 20 px wide")) << wrong.second[0];
@@ -294,11 +356,15 @@ TEST(TouchingDistance, OfPairsIsWhereTheirDistancesBegin) {
   EXPECT_FALSE(touching_distance(pairs_of_distances(400, 1500, 0), 10)) << "no edge";
   EXPECT_FALSE(touching_distance(pairs_of_distances(400, 90, 0), 3.9)) << "farther than five radii";
   // A few that are nearer blur the edge; others of another size are left out.
-  auto blurred = pairs_of_distances(400, 90, 0);
+  auto blurred = pairs_of_distances(300, 90, 0);
   for (std::size_t k = 0; k < 8; k += 2) blurred[0].disks[k].x_px += 1;
   const auto soft = touching_distance(blurred, 10);
   ASSERT_TRUE(soft);
   EXPECT_FALSE(soft->sharp);
+  // The least half per cent of 600 distances ends with the fourth of them, that of the second pair.
+  const double below = 1 - (std::sqrt(400 - 90 * std::log1p(-1.5 / 300)) - 1) / soft->px;
+  EXPECT_NEAR(soft->std_error_px,
+              std::hypot(0.004 * soft->px, 0.5 * below * soft->px, 0.5 * 90 / 20 * std::sqrt(0.05 / 600)), 2e-3);
   EXPECT_GT(soft->std_error_px, 0.4);
   for (std::size_t k = 0; k < 8; ++k) blurred[0].disks[k].other_size = true;
   EXPECT_TRUE(touching_distance(blurred, 10)->sharp);
@@ -326,6 +392,30 @@ TEST(BedGeometry, WeighsTheOutlineAgainstTheDistanceOfTouchingBeads) {
     EXPECT_NEAR(radius, 0.5 * distance - 0.05 + share * 0.05, 1e-9);
     EXPECT_NEAR(error, 0.1 * std::sqrt(1 - share), 1e-9);
     EXPECT_TRUE(warnings.empty());
+  }
+  // They agree within two errors of both together.
+  for (const double errors : {1.95, 2.05}) {
+    const double radius = 0.5 * (distance - errors * std::hypot(0.2, its_error));
+    EXPECT_EQ(std::get<0>(found(radius, 0.1, false)) < 0.5 * distance - 1e-9, errors < 2) << errors;
+  }
+  // Where the outline is larger than the distance allows, by less than a hundredth of it, nothing is said.
+  for (const double larger : {0.0097, 0.0103}) {
+    const auto [radius, error, warnings] = found(0.5 * (1 + larger) * distance, 1e-4, false);
+    EXPECT_NEAR(error, std::hypot(1e-4, 0.25 * larger * distance), 1e-9) << "they disagree";
+    EXPECT_EQ(warnings.empty(), larger < 0.01);
+  }
+  {  // Of beads that are brighter on one side the outline is known to two thousandths at best.
+    FilmCalibration film = film_of(300, 200);
+    BeadAsymmetry::Harmonics even;
+    even.step_px = 1;
+    for (std::size_t m = 0; m < 6; ++m) even.cosine[m].assign(14, 0.0), even.sine[m].assign(14, 0.0);
+    film.finder.profile.asymmetry = std::make_shared<const BeadAsymmetry>(even);
+    auto frames = three_rows();
+    FinderCalibration refined = film.finder;
+    BedCalibration bed;
+    find_geometry(film, frames, refined, bed);
+    EXPECT_NEAR(bed.radius_std_error_px, std::hypot(0.05, 0.02), 1e-12);
+    EXPECT_NEAR(bed.scale_relative_std_error, std::hypot(0.005, 0.002), 1e-12);
   }
   {  // The outline is clearly smaller: the distance is taken, up to 8 %.
     const auto [radius, error, warnings] = found(9.6, 0.01, false);

@@ -258,6 +258,10 @@ TEST(Candidates, NoiseOfAResidualIsThatOfItsSmallerHalf) {
   EXPECT_NEAR(residual_noise(fit_of(steps)), 410.0 / 1190 / 0.32465, 1e-6);
   EXPECT_NEAR(residual_spread(fit_of(steps)), 1.4826, 1e-6);
   EXPECT_EQ(residual_noise(fit_of(even_frame(1, 1, 3))), 0);
+  // Of a large frame every second row and column is looked at, but not the same columns in all rows: of sizes 1 and 0.4
+  // in turn half are 0.4.
+  const GrayFrame stripes = frame_by(400, 220, [](int column, int) { return column % 2 ? 0.4 : 1; });
+  EXPECT_NEAR(residual_noise(fit_of(stripes)), 0.4 / 0.32465, 1e-6);
 }
 
 // A disk of learned profile is looked for by the ideal disk unless it is strongly blurred, or hollow.

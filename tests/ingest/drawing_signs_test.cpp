@@ -237,6 +237,18 @@ TEST(DrawingSigns, BeadsDrawnWithoutNoiseAreFound) {
               0.1 * static_cast<double>(beads));
 }
 
+// Shares are those of the pixels inside: of 3 x 3 px there is one, of fewer none.
+TEST(DrawingSigns, AreThoseOfInnerPixels) {
+  const auto even = [](int width, int height) {
+    GrayFrame frame{width, height, {}};
+    frame.pixels.assign(static_cast<std::size_t>(width * height), 100.0F);
+    return signs_of_drawing(frame);
+  };
+  EXPECT_EQ(even(3, 3).flat_share, 1);
+  EXPECT_EQ(even(2, 3).flat_share, 0);
+  EXPECT_EQ(even(3, 2).flat_share, 0);
+}
+
 // The region alone is judged, so a photograph on a page can be cut out.
 TEST(DrawingSigns, APhotographOnAPageIsFoundInItsRegion) {
   std::mt19937 random(8);

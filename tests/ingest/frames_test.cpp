@@ -148,6 +148,22 @@ TEST(Frames, FolderAndGlobAreReadInNaturalOrder) {
   }
 }
 
+// By numbers where names have some, whatever their zeros; the shorter name first, in any alphabet.
+TEST(Frames, NamesAreInNaturalOrder) {
+  const ScratchFolder folder;
+  const std::vector<std::string> ordered = {"a",   "a01", "a1", "a1b", "a2", "a10",     "a10b2",   "a10b11",
+                                            "a11", "aab", "ab", "abb", "b",  "b\u00e4", "b\u00e4c"};
+  for (std::size_t k = ordered.size(); k-- > 0;)
+    write_png(folder / (ordered[k] + ".png"), ramp(8, 8, static_cast<float>(k)));
+  FrameSource source = FrameSource::open({folder / "*.png"});
+  std::vector<std::string> seen;
+  for (const FrameOrigin& origin : source.first_origins(ordered.size())) {
+    const std::string name = origin.path.substr(origin.path.rfind('/') + 1);
+    seen.push_back(name.substr(0, name.size() - 4));
+  }
+  EXPECT_EQ(seen, ordered);
+}
+
 TEST(Frames, StrideKeepsEveryKth) {
   FrameSource source = FrameSource::from_generator(7, [](std::size_t k) { return ramp(4, 4, static_cast<float>(k)); });
   std::size_t count = 0;

@@ -355,6 +355,45 @@ TEST(JointFit, KnowsTheCovarianceOfCentresThatShareTheirPixels) {
   }
 }
 
+// Of a chain of three beads the ends share no pixels. What an end does not know of the other one is in its error all
+// the same, whatever the curvature of each, as that of a bead in a corner: the inverse of the whole matrix.
+TEST(JointFit, KnowsTheCovarianceOfTheEndsOfAChain) {
+  constexpr double radius = 5, edge = 1.6, reach = 9.4;
+  const ProfileTable table(test::blurred_profile(radius, edge, reach), radius, edge, 0);
+  std::vector<ModelDisk> disks = {model_at(20, 20), model_at(28.3, 24.9), model_at(37.2, 28.6)};
+  EXPECT_GT(std::hypot(disks[2].x - disks[0].x, disks[2].y - disks[0].y), 2 * reach);
+  disks[0].hessian_xx = 3, disks[0].hessian_xy = 1.1, disks[0].hessian_yy = 2;
+  disks[1].hessian_xx = 2.2, disks[1].hessian_xy = -0.6, disks[1].hessian_yy = 2.7;
+  disks[2].hessian_xx = 1.4, disks[2].hessian_xy = 0.7, disks[2].hessian_yy = 2.4;
+  std::vector<std::vector<double>> matrix(6, std::vector<double>(6, 0.0));
+  for (std::size_t k = 0; k < 3; ++k) {
+    matrix[2 * k][2 * k] = disks[k].hessian_xx, matrix[2 * k + 1][2 * k + 1] = disks[k].hessian_yy;
+    matrix[2 * k][2 * k + 1] = matrix[2 * k + 1][2 * k] = disks[k].hessian_xy;
+  }
+  for (std::size_t k = 0; k < 2; ++k) {  // along the line of centres and across it, of the mean curvature of both
+    const ModelDisk &one = disks[k], &other = disks[k + 1];
+    const double away = std::hypot(other.x - one.x, other.y - one.y);
+    const std::array<double, 2> unit = {(other.x - one.x) / away, (other.y - one.y) / away};
+    const auto [along, across] = table.overlap(away);
+    EXPECT_GT(std::abs(along), 0.1);
+    const double mean = std::sqrt((one.hessian_xx + one.hessian_yy) / 2 * (other.hessian_xx + other.hessian_yy) / 2);
+    for (std::size_t a = 0; a < 2; ++a)
+      for (std::size_t b = 0; b < 2; ++b)
+        matrix[2 * k + a][2 * k + 2 + b] = matrix[2 * k + 2 + a][2 * k + b] =
+            mean * (along * unit[a] * unit[b] + across * ((a == b ? 1 : 0) - unit[a] * unit[b]));
+  }
+  JointFit fit(even_frame(55, 52, 0));
+  fit.set_table(&table);
+  const auto covariances = fit.covariances(disks);
+  const auto inverse = test::inverse_of(matrix);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double scale = 1e-3 * inverse[2 * k][2 * k];
+    EXPECT_NEAR(covariances[k].xx, inverse[2 * k][2 * k], scale) << k;
+    EXPECT_NEAR(covariances[k].xy, inverse[2 * k][2 * k + 1], scale) << k;
+    EXPECT_NEAR(covariances[k].yy, inverse[2 * k + 1][2 * k + 1], scale) << k;
+  }
+}
+
 // Two cut beads whose shared part outweighs what each has along one axis: each has the error of its own Hessian.
 TEST(JointFit, HasTheErrorOfOneBeadWhereTwoShareTooMuch) {
   const ProfileTable table(test::blurred_profile(fit_radius, fit_edge, fit_reach), fit_radius, fit_edge, 0);

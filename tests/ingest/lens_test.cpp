@@ -102,8 +102,37 @@ TEST(Lens, ThereAndBackAgain) {
       EXPECT_NEAR(again.y, place.y, 1e-9);
     }
   }
-  EXPECT_THROW(LensMap({3, 0}, 640, 480), std::invalid_argument);
-  EXPECT_THROW(LensMap({1, 0.5}, 640, 480), std::invalid_argument);
+}
+
+// Pixels from half to twice as wide as high, and radial terms of up to 0.3. Where corners move out, the true frame is
+// larger by as much on each side, in whole pixels.
+TEST(Lens, HasItsLimitsAndItsMargins) {
+  for (const Lens& lens : {Lens{0.5, 0}, {2, 0}, {1, 0.3}, {1, -0.3}}) EXPECT_NO_THROW(LensMap(lens, 640, 480));
+  for (const Lens& lens : {Lens{0.499, 0}, {2.01, 0}, {1, 0.301}, {1, -0.301}, {NAN, 0}, {1, NAN}})
+    EXPECT_THROW(LensMap(lens, 640, 480), std::invalid_argument) << lens.pixel_aspect << ' ' << lens.radial;
+  struct Case {
+    Lens lens;
+    int width, height;
+  };
+  // 1.25 x 100 = 125 px and, at 0.1, 7 = ceil(6.25) more on each side; of 60 rows 3 more.
+  for (const auto& [lens, width, height] :
+       {Case{{1.25, 0}, 125, 60}, {{1.25, -0.1}, 125, 60}, {{1.25, 0.1}, 139, 66}}) {
+    const LensMap map(lens, 100, 60);
+    GrayFrame recorded;
+    recorded.width = 100, recorded.height = 60, recorded.pixels.assign(6000, 50.0F);
+    const GrayFrame seen = map.corrected(recorded);
+    EXPECT_EQ(seen.width, width);
+    EXPECT_EQ(seen.height, height);
+    const PixelPlace middle = map.to_true({49.5, 29.5});  // stays in the middle
+    EXPECT_NEAR(middle.x, 0.5 * (width - 1), 1e-9);
+    EXPECT_NEAR(middle.y, 0.5 * (height - 1), 1e-9);
+    // A corner moves out by the radial term, in half diagonals of the frame without margins.
+    const PixelPlace corner = map.to_true({-0.5, -0.5});
+    EXPECT_NEAR(corner.x, 0.5 * (width - 1) - 62.5 * (1 + lens.radial), 1e-9);
+    EXPECT_NEAR(corner.y, 0.5 * (height - 1) - 30 * (1 + lens.radial), 1e-9);
+    recorded.width = 99;
+    EXPECT_THROW((void)map.corrected(recorded), std::invalid_argument);
+  }
 }
 
 // The two ways of interpolation, rows that stay rows and rows that bend, up to the border.

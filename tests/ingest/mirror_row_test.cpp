@@ -58,6 +58,11 @@ TEST(MirrorRow, NeedsFiveImagesThatAreBelowTheirBeads) {
   EXPECT_TRUE(MirroredBeads().pairs(6, 1.49).seen());
   EXPECT_FALSE(MirroredBeads().pairs(6, 1.51).seen()) << "more than three diameters apart";
   EXPECT_TRUE(MirroredBeads().pairs(6, 1, 0.8, 0.14).seen());
+  // A bead that was found twice has one image: of six disks below the row four are images.
+  MirroredBeads doubled = MirroredBeads().pairs(4);
+  for (const double x : {5.0, 10.0}) doubled.add(x + 0.02, 1, 1);
+  doubled.add(90, -3, 0.8), doubled.add(99, -4, 0.8);
+  EXPECT_FALSE(doubled.seen());
   EXPECT_FALSE(MirroredBeads().pairs(6, 1, 0.8, 0.16).seen()) << "beside the mirrored place";
   EXPECT_TRUE(MirroredBeads().pairs(6, 1, 0.92).seen());
   EXPECT_FALSE(MirroredBeads().pairs(6, 1, 0.94).seen()) << "as bright as beads";

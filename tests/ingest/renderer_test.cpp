@@ -322,6 +322,7 @@ TEST(SyntheticRows, AreAHoneycombOnTheFloor) {
   EXPECT_NEAR(x, 205, 5 * 386 / std::sqrt(12.0 * 300));
   // A jitter of 0.5 px is a normal one, of those that do not run into a wall or the floor: of a bead in a corner a
   // quarter, by 0.5 sqrt 2 px (rms).
+  for (const RenderedDisk& disk : gas) EXPECT_EQ(std::hypot(disk.velocity_x_px_per_s, disk.velocity_y_px_per_s), 0);
   SyntheticBed loose;
   loose.right_wall_px = 39, loose.floor_px = 100, loose.rows = 1, loose.radius_px = 10, loose.jitter_px = 0.5;
   double displaced = 0, square = 0;

@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "ingest/calibrate/radius_vote.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/bead_profile.hpp"
+#include "ingest/find/bead_set.hpp"
 #include "ingest/find/circle_search.hpp"
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/outline.hpp"
@@ -166,6 +170,125 @@ TEST(Turned, RimsAreTheSame) {
     EXPECT_NEAR(round.on_circle, plainly.on_circle, 0.02) << turn.what;
     EXPECT_NEAR(round.deviation, plainly.deviation, 2e-3) << turn.what;
     EXPECT_NEAR(round.rim_width, plainly.rim_width, 2e-3) << turn.what;
+  }
+}
+
+// Beads of contrast 1, as fits see them: the same bead at all places above, brighter on one side, and something in each
+// pixel that repeats nowhere.
+constexpr double fitted_radius = 9.03, fitted_edge = 1.1, fitted_reach = 13;
+const BeadProfile& fitted_profile() {
+  static const BeadProfile profile = test::blurred_profile(fitted_radius, fitted_edge, fitted_reach, 0.05);
+  return profile;
+}
+std::vector<ModelDisk> fitted_beads() {
+  std::vector<ModelDisk> disks;
+  for (const RenderedDisk& bead : turned_beads()) {  // no pixel on the border of an eighth of a turn
+    const auto k = static_cast<int>(disks.size());
+    ModelDisk& disk = disks.emplace_back();
+    disk.x = bead.x_px + 0.02 * test::scattered(k, 1), disk.y = bead.y_px + 0.02 * test::scattered(1, k);
+  }
+  return disks;
+}
+std::vector<ModelDisk> turned_places(const std::vector<ModelDisk>& disks, const GrayFrame& frame, const Turn& turn) {
+  std::vector<ModelDisk> turned = disks;
+  for (ModelDisk& disk : turned) std::tie(disk.x, disk.y) = turn.place(frame, disk.x, disk.y);
+  return turned;
+}
+GrayFrame flat_frame() {
+  const std::vector<ModelDisk> disks = fitted_beads();
+  return test::frame_by(turned_width, turned_height, [&](int column, int row) {
+    double level = 0.1 * test::scattered(column, row) - 0.05;
+    for (const ModelDisk& disk : disks) {
+      const double dx = column - disk.x, dy = row - disk.y, r = std::hypot(dx, dy);
+      const auto cell = static_cast<std::size_t>(r / fitted_profile().step_px);
+      if (cell < fitted_profile().level.size())
+        level += static_cast<double>(fitted_profile().level[cell]) * (1 + 0.02 * dx - 0.012 * dy);
+    }
+    return level;
+  });
+}
+
+// Beads that a border cuts have the same share in what is learned, whichever border it is.
+TEST(Turned, LearnedBeadsAreTheSame) {
+  const GrayFrame flat = flat_frame();
+  const std::vector<ModelDisk> disks = fitted_beads();
+  const ProfileTable table(fitted_profile(), fitted_radius, fitted_edge, 0);
+  struct Learned {
+    BeadProfile profile;
+    std::shared_ptr<const BeadAsymmetry> asymmetry;
+    FreeRim open;
+  };
+  const auto learned_of = [&](const GrayFrame& frame, const std::vector<ModelDisk>& beads) {
+    JointFit fit(frame);
+    fit.set_table(&table);
+    fit.reset(frame, beads);
+    return Learned{
+        learn_profile({&fit}, {&beads}, fitted_profile(),
+                      {.reach_px = fitted_reach, .knot_px = 0.6, .radius_px = fitted_radius, .fourth_harmonic = true}),
+        learn_asymmetry({&fit}, {&beads}, fitted_profile(), {.radius_px = fitted_radius, .noise = 0.02}),
+        learn_free_rim({frame}, {&beads}, fitted_radius, 0.4)};
+  };
+  const Learned plain = learned_of(flat, disks);
+  ASSERT_TRUE(plain.asymmetry);
+  EXPECT_GT(plain.open.sectors, 10U);
+  const auto expect_same = [](const std::vector<float>& one, const std::vector<float>& other, const char* what) {
+    ASSERT_EQ(one.size(), other.size()) << what;
+    for (std::size_t k = 0; k < one.size(); ++k) ASSERT_NEAR(one[k], other[k], 1e-4F) << what << ' ' << k;
+  };
+  for (const Turn& turn : turns()) {
+    if (turn.negative) continue;  // contrasts are those of beads
+    const Learned learned = learned_of(turn.of(flat), turned_places(disks, flat, turn));
+    expect_same(learned.profile.level, plain.profile.level, turn.what);
+    expect_same(learned.profile.fourth_harmonic, plain.profile.fourth_harmonic, turn.what);
+    EXPECT_EQ(learned.open.sectors, plain.open.sectors) << turn.what;
+    expect_same(learned.open.profile.level, plain.open.profile.level, turn.what);
+    ASSERT_TRUE(learned.asymmetry) << turn.what;
+    for (double y = -8.5; y < 9; y += 1.7)
+      for (double x = -8.3; x < 9; x += 1.7) {
+        const auto [u, v] = turn.vector(x, y);
+        ASSERT_NEAR(learned.asymmetry->at(u, v), plain.asymmetry->at(x, y), 1e-6) << turn.what << ' ' << x << ' ' << y;
+      }
+  }
+}
+
+// What is said of each bead, where it moves to, and its error.
+TEST(Turned, FitsAreTheSame) {
+  const GrayFrame flat = flat_frame();
+  std::vector<ModelDisk> disks = fitted_beads();
+  for (std::size_t k = 0; k < disks.size(); ++k) {
+    disks[k].x += 0.6 * test::scattered(static_cast<int>(k), 3) - 0.3;
+    disks[k].y += 0.6 * test::scattered(3, static_cast<int>(k)) - 0.3;
+  }
+  const ProfileTable table(fitted_profile(), fitted_radius, fitted_edge, 0.7);
+  const auto fitted = [&](const GrayFrame& frame, std::vector<ModelDisk>& beads) {
+    JointFit fit(frame);
+    fit.set_table(&table);
+    fit.reset(frame, beads);
+    fit.sweep(beads, 0.2, 1e-5, 0.3);
+    fit.step_together(frame, beads, 0.1, 0.3);
+    fit.judge(beads, fitted_radius + 1);
+    return fit.covariances(beads);
+  };
+  std::vector<ModelDisk> plain = disks;
+  const std::vector<CentreCovariance> errors = fitted(flat, plain);
+  for (const Turn& turn : turns()) {
+    if (turn.negative) continue;
+    const GrayFrame turned = turn.of(flat);
+    std::vector<ModelDisk> beads = turned_places(disks, flat, turn);
+    const std::vector<CentreCovariance> covariances = fitted(turned, beads);
+    for (std::size_t k = 0; k < beads.size(); ++k) {
+      const auto [x, y] = turn.place(flat, plain[k].x, plain[k].y);
+      EXPECT_NEAR(beads[k].x, x, 1e-4) << turn.what << ' ' << k;
+      EXPECT_NEAR(beads[k].y, y, 1e-4) << turn.what << ' ' << k;
+      EXPECT_NEAR(beads[k].explained, plain[k].explained, 1e-4) << turn.what << ' ' << k;
+      EXPECT_NEAR(beads[k].amplitude, plain[k].amplitude, 1e-4) << turn.what << ' ' << k;
+      EXPECT_NEAR(beads[k].rim_explained, plain[k].rim_explained, 1e-4) << turn.what << ' ' << k;
+      EXPECT_NEAR(beads[k].best_explained, plain[k].best_explained, 1e-4) << turn.what << ' ' << k;
+      const CentreCovariance &one = covariances[k], &other = errors[k];
+      EXPECT_NEAR(one.xx, turn.transpose ? other.yy : other.xx, 1e-3 * other.xx) << turn.what << ' ' << k;
+      EXPECT_NEAR(one.yy, turn.transpose ? other.xx : other.yy, 1e-3 * other.yy) << turn.what << ' ' << k;
+      EXPECT_NEAR(one.xy, turn.transpose ? other.xy : -other.xy, 1e-3 * other.xx) << turn.what << ' ' << k;
+    }
   }
 }
 

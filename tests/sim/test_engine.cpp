@@ -212,6 +212,35 @@ TEST(Engine, LetsABedLieThatHasComeToRest) {
   }
 }
 
+// Two rows and a half on a floor that stands still, as hard disks: they lie after 0.66 sqrt(D/g), if they may and
+// nothing kicks them.
+TEST(Engine, LetsNoBedLieThatIsKickedOrMayNot) {
+  const auto lies = [](const auto& change) {
+    Scene scene;
+    scene.gravity = UniformGravity{};
+    scene.disks.species = {{16, 1, 1}};
+    scene.disks.contact = scene.box.floor_surface = {0.6, 0.5, 0};
+    scene.disks.contact_duration = 1e-4;
+    scene.box.width = 5.3;
+    scene.box.sides = HardSides{{0.6, 0.5, 0}};
+    scene.presses = false;
+    scene.start_temperature = 0.01;
+    change(scene);
+    const auto bed = simulate(scene);
+    bed->advance_to(0.7);
+    Snapshot at;
+    bed->snapshot(at);
+    int still = 0;
+    for (std::size_t i = 0; i < at.z.size(); ++i) still += at.vx[i] == 0 && at.vz[i] == 0;
+    EXPECT_TRUE(still == 0 || still >= 15) << still;
+    return still > 0;
+  };
+  EXPECT_TRUE(lies([](Scene&) {}));
+  EXPECT_FALSE(lies([](Scene& s) { s.rests = false; }));
+  EXPECT_FALSE(lies([](Scene& s) { s.bath = LangevinBath{1e-9, 1e-3, 10}; }));
+  EXPECT_FALSE(lies([](Scene& s) { s.bath = AndersenBath{1e-9, 1e-9}; }));
+}
+
 // It lands, rests but for a few disks on top, and takes off when the floor falls faster than it, again and again.
 TEST(Engine, LetsARestingBedTakeOff) {
   constexpr double gamma = 1.15, period = 1 / 0.35, frequency = 2 * std::numbers::pi * 0.35, since = 0.3;

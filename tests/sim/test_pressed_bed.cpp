@@ -8,7 +8,10 @@
 #include <cstdint>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <variant>
 #include <vector>
 
 #include "sim/engine/pressed_bed.hpp"
@@ -330,6 +333,71 @@ TEST(PressedBed, PressesOnTheFloorWithItsWeight) {
     const double weight = 120 / 12.3;
     EXPECT_NEAR(observer.floor_pressure().value, weight, 0.01 * weight) << gamma;
   }
+}
+
+// Whether and when a few rows go on as soft disks: laid on the floor or, if they are rough, shaken gently below a lid.
+std::optional<double> pressed_first_at(const Scene& scene, double until) {
+  const auto bed = simulate(scene);
+  for (double time = 0.02; time <= until; time += 0.02) {
+    bed->advance_to(time);
+    if (bed->energy().compressed > 0) return time;
+  }
+  return {};
+}
+Scene few_rows(double friction, bool lid) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{16, 1, 1}};
+  scene.disks.contact = scene.box.floor_surface = {0.6, friction, 0};
+  scene.disks.contact_duration = 1e-4;
+  scene.box.width = 4.6;
+  scene.box.sides = HardSides{{0.6, friction, 0}};
+  if (lid) scene.box.top = Lid{6, {0.6, friction, 0}};
+  if (friction > 0) scene.box.floor = SinusoidalFloor{1.2 / std::pow(2 * std::numbers::pi * 0.428, 2), 0.428};
+  scene.start_temperature = 0.01;
+  return scene;
+}
+
+// Springs whose dashpots would need shorter steps, or that no tangential spring can follow, leave a bed to its events.
+// So do boxes in which a disk has two images, contacts without a duration or with a restitution that varies, and baths.
+TEST(PressedBed, IsTakenForOneWithinItsLimits) {
+  const auto laid = [](const auto& change) {
+    Scene scene = few_rows(0, false);
+    change(scene);
+    return pressed_first_at(scene, 0.1).has_value();
+  };
+  EXPECT_TRUE(laid([](Scene&) {}));
+  EXPECT_FALSE(laid([](Scene& s) { s.presses = false; }));
+  EXPECT_FALSE(laid([](Scene& s) { s.disks.contact_duration = 0; }));
+  EXPECT_FALSE(laid([](Scene& s) { s.disks.contact.law = RestitutionLaw::power; }));
+  EXPECT_FALSE(laid([](Scene& s) { s.bath = LangevinBath{0.01, 1e-3, 0.1}; }));
+  for (const double width : {4.0, 3.99}) EXPECT_EQ(laid([width](Scene& s) { s.box.width = width; }), width >= 4);
+  struct Kind {
+    const char* name;
+    Surface& (*of)(Scene&);
+  };
+  const Kind kinds[] = {{"disks", [](Scene& s) -> Surface& { return s.disks.contact; }},
+                        {"sides", [](Scene& s) -> Surface& { return std::get<HardSides>(s.box.sides).surface; }},
+                        {"floor", [](Scene& s) -> Surface& { return s.box.floor_surface; }},
+                        {"lid", [](Scene& s) -> Surface& { return std::get<Lid>(s.box.top).surface; }}};
+  for (const Kind& kind : kinds) {
+    SCOPED_TRACE(kind.name);
+    Scene smooth = few_rows(0, kind.name == std::string("lid")), rough = few_rows(0.5, true);
+    kind.of(smooth).restitution = 0.3;
+    const std::optional<double> smooth_since = pressed_first_at(smooth, 3);
+    ASSERT_TRUE(smooth_since);
+    kind.of(smooth).restitution = 0.29;
+    EXPECT_FALSE(pressed_first_at(smooth, *smooth_since + 0.1));
+    kind.of(rough).tangential_restitution = -0.3;
+    const std::optional<double> rough_since = pressed_first_at(rough, 5);
+    ASSERT_TRUE(rough_since);
+    kind.of(rough).tangential_restitution = -0.31;
+    EXPECT_FALSE(pressed_first_at(rough, *rough_since + 0.1));
+  }
+  // Without friction nothing slips back.
+  Scene slippery = few_rows(0.5, true);
+  std::get<Lid>(slippery.box.top).surface = {0.6, 0, -0.5};
+  EXPECT_TRUE(pressed_first_at(slippery, 5));
 }
 
 // Well shaken beds are not touched, not even by rounding.

@@ -92,6 +92,46 @@ TEST(PressedByHand, ApproachesByTheMeanOfItsContacts) {
   }
 }
 
+// Out of each wall, wherever the floor is, by all of the overlap; two disks by 1.6 times theirs, half of it each, also
+// across periodic sides. No sweep is made beyond the number asked for, nor once all overlap by no more than is allowed.
+TEST(PressedByHand, MovesApartFromEachWallAndFromOneAnother) {
+  constexpr double overlap = 2e-3, raised = 0.7;
+  for (const OnAWall& wall : walls_of_the_box) {
+    SCOPED_TRACE(wall.name);
+    const double up = wall.in_z > 0 ? raised : 0;
+    for (const int sweeps : {0, 1}) {
+      PressedBed bed = smooth_bed();
+      bed.begin({{wall.x - overlap * wall.in_x, wall.z + up - overlap * wall.in_z, 0, 0}}, {raised, 0, 0}, lasts);
+      bed.separate(raised, 1e-13, sweeps);
+      const double left = sweeps > 0 ? 0 : overlap;
+      EXPECT_NEAR(bed.at(0, 0).x, wall.x - left * wall.in_x, 1e-14);
+      EXPECT_NEAR(bed.at(0, 0).z, wall.z + up - left * wall.in_z, 1e-14);
+    }
+  }
+  for (const double period : {0.0, 10.0}) {
+    PressedBed bed;
+    const Surface plain{1, 0, 0};
+    bed.set_up({10, period, 30}, {plain, plain, plain, plain});
+    const double x = period > 0 ? 9.8 : 4;
+    bed.begin({{x, 15, 0, 0}, {x + 0.6 * (1 - overlap) - period, 15 + 0.8 * (1 - overlap), 0, 0}}, floor_at_rest,
+              lasts);
+    bed.separate(0, overlap, 1);
+    const double by = 0.8 * overlap;
+    EXPECT_NEAR(bed.at(0, 0).x, x - 0.6 * by, 1e-14) << period;
+    EXPECT_NEAR(bed.at(0, 0).z, 15 - 0.8 * by, 1e-14) << period;
+    EXPECT_NEAR(bed.at(1, 0).x, x - period + 0.6 * (1 - overlap + by), 1e-14) << period;
+    EXPECT_NEAR(bed.at(1, 0).z, 15 + 0.8 * (1 - overlap + by), 1e-14) << period;
+  }
+  // A disk between a wall and another one is moved into the wall, and by the next sweep out of it.
+  for (const bool again : {false, true}) {
+    PressedBed bed = smooth_bed();
+    bed.begin({{0.5, 15, 0, 0}, {1.5 - overlap, 15, 0, 0}}, floor_at_rest, lasts);
+    bed.separate(0, (again ? 0.99 : 1.01) * overlap, 2);
+    EXPECT_NEAR(bed.at(0, 0).x, 0.5 - (again ? 0.16 : 0.8) * overlap, 1e-14);
+    EXPECT_NEAR(bed.at(1, 0).x, 1.5 - (again ? 0.04 : 0.2) * overlap, 1e-14);
+  }
+}
+
 // One disk flies, the other is pressed on the floor, by more than its weight.
 TEST(PressedByHand, FliesOnBetweenSteps) {
   PressedBed bed = smooth_bed();

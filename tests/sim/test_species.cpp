@@ -55,6 +55,25 @@ TEST(SpeciesTemperatures, AreThoseOfAStateByHand) {
   EXPECT_DOUBLE_EQ(observer.height(2), 2.5);
 }
 
+// Five layers of 0.4 D from 1.1 D below the floor's mean on; what lies beyond counts for the outermost ones.
+TEST(SpeciesTemperatures, AreFiledInTheLayersOfTheirGrid) {
+  SpeciesObserver observer(two_species(4, 2), {std::vector<double>(6, 0.5), {1, 3, 1, 1, 3, 1}}, 1, {-1.1, 0.4, 5});
+  Snapshot at;
+  at.z = {-1.05, -0.71, -0.69, 0.49, 0.51, 7}, at.x = at.vx = at.vz = std::vector<double>(6, 1);
+  observer.observe(at);
+  at.z[2] = -4;
+  observer.observe(at);
+  at.z[2] = -0.31;
+  observer.observe(at);
+  const double light[] = {4, 2, 0, 3, 3}, heavy[] = {3, 0, 0, 0, 3};
+  for (std::size_t layer = 0; layer < 5; ++layer) {
+    EXPECT_EQ(observer.cell(layer, SpeciesObserver::first).count, light[layer]) << layer;
+    EXPECT_EQ(observer.cell(layer, SpeciesObserver::second).count, heavy[layer]) << layer;
+    EXPECT_NEAR(observer.height(layer), -0.9 + 0.4 * static_cast<double>(layer), 1e-12);
+    EXPECT_NEAR(observer.number_density(layer, SpeciesObserver::second), heavy[layer] / (3 * 10 * 0.4), 1e-12);
+  }
+}
+
 // In a layer at rest in the mean T is half of <m v_x^2> + <m v_z^2>: 1 (v = +-1) and 3.
 TEST(SpeciesTemperatures, OfALayerAreWithoutItsMean) {
   const Scene scene = two_species(1, 1);
