@@ -448,8 +448,10 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   // Faces do not show whether things are round.
   const GapModel& gaps = *rims.model.gaps;
   const bool of_one_size = gaps.other_sizes.empty() && gaps.not_round.empty();
-  if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
-  if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
+  if (!options.seen->by_rims) {
+    if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
+    if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
+  }
   if (!options.quick_rims) rims = most_telling(frame, std::move(rims), options);
   return calibration_by_rims(frame, rims, options);
 }

@@ -10,6 +10,9 @@
 
 namespace shakebed::ingest {
 
+// px: the radius that beads have, at least, in a frame that is reduced for a trial. Their faces are then learned.
+inline constexpr double trial_radius_px = 9;
+
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options);
 
 // By rims alone, from one frame.

@@ -19,12 +19,11 @@ namespace shakebed::ingest {
 
 namespace {
 
-constexpr double trial_radius_px = 9;  // frames are averaged down to it for the trials
-constexpr int trial_side_px = 640;     // of the part of a frame that trials look at, to compare channels
-// The same where there is one channel, to see whether faces are alike. In 400 px a packed bed may hide all ground, and
-// is then found by its rims.
-constexpr int lone_side_px = 480;
-constexpr int glance_side_px = 320;    // of the part, where only the channel is asked for: a quarter of the time
+// Of the part of a frame that trials look at, to compare channels and to see whether faces are alike. In 400 px a
+// packed bed may hide all ground, and is then found by its rims.
+constexpr int trial_side_px = 480;
+// Of the part where only the channel is asked for, and where channels are chosen for a trial: a quarter of the time.
+constexpr int glance_side_px = 320;
 constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
 // The same, for a change from faces to rims: their centres may be wrong by a tenth of a radius, so that they have to
 // show another tenth of the beads.
@@ -134,7 +133,8 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
 
 class ChannelTrials {
  public:
-  ChannelTrials(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options)
+  // `side_px`: of the part of a frame that trials look at.
+  ChannelTrials(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options, int side_px)
       : frames_(frames), best_(best) {
     const double radius = best.rims.radius_px / frames.reduction;
     factor_ = std::max(1, static_cast<int>(radius / trial_radius_px));
@@ -142,8 +142,7 @@ class ChannelTrials {
     std::vector<std::pair<double, double>> places;
     for (const RimDisk& disk : best.disks) places.emplace_back(disk.circle.x / all, disk.circle.y / all);
     const GrayFrame& frame = frames.channels.front().frame;
-    const int side = options.channel_alone ? glance_side_px : frames.channels.size() > 1 ? trial_side_px : lone_side_px;
-    part_ = part_with_most(places, side, frame.width / factor_, frame.height / factor_);
+    part_ = part_with_most(places, side_px, frame.width / factor_, frame.height / factor_);
     if (!options.roi) return;
     roi_ = PixelRectangle{options.roi->left / all - part_.left, options.roi->top / all - part_.top,
                           options.roi->width / all, options.roi->height / all};
@@ -163,11 +162,8 @@ class ChannelTrials {
     // Of a single channel it is only asked whether its faces are alike.
     const Shades shades = frames_.channels.size() > 1 ? Shades::where_doubtful : Shades::common;
     if (!options.search || !searches_all(picture, options)) return trial_in(picture, best_.rims.polarity, shades);
-    FindOptions find = *options.search;
-    find.seen = BeadsSeen{best_.rims.polarity, radius_px(), best_.one_sided};
-    if (find.radius_px) *find.radius_px /= frames_.reduction;
-    find.recorded_px = frames_.reduction;
-    FindOptions asked = find;
+    FindOptions asked = asked_of_run(best_.rims.polarity, options);
+    FindOptions find = asked;
     find.rims_of_one_size = true;  // which faces do not depend on
     CalibrationResult learned = learn_beads({&picture}, find);
     Trial trial = tried(picture, find, learned, shades);
@@ -176,6 +172,22 @@ class ChannelTrials {
       trial.searched =
           std::make_shared<SearchedFrame>(picture, frames_.reduction, std::move(asked), std::move(learned));
     return trial;
+  }
+
+  // Of a candidate whose beads were found by their rims in the part: by their faces, if all of the frame shows these.
+  // In the part beads may hide all ground.
+  void try_faces_in_all(SurveyCandidate& settled, const SurveyOptions& options) const {
+    const auto chosen = std::find_if(frames_.channels.begin(), frames_.channels.end(),
+                                     [&](const ChannelFrames::One& one) { return one.channel == settled.channel; });
+    GrayFrame all = factor_ > 1 ? reduced(chosen->frame, factor_) : chosen->frame;
+    FindOptions asked = asked_of_run(settled.rims.polarity, options);
+    FindOptions find = asked;
+    find.quick_rims = true;  // which faces do not depend on
+    CalibrationResult learned = learn_beads({&all}, find);
+    settled.by_rims = !learned.found || learned.calibration.by_rims;
+    if (!settled.by_rims && options.search)
+      settled.searched = std::make_shared<SearchedFrame>(std::move(all), frames_.reduction * factor_, std::move(asked),
+                                                         std::move(learned));
   }
 
   // What a quick search by rims finds.
@@ -233,6 +245,16 @@ class ChannelTrials {
   }
 
  private:
+  // What the run will ask of frames as they are reduced here.
+  [[nodiscard]] FindOptions asked_of_run(Polarity polarity, const SurveyOptions& options) const {
+    const int all = frames_.reduction * factor_;
+    FindOptions asked = options.search.value_or(FindOptions{});
+    asked.seen = BeadsSeen{polarity, radius_px(), best_.one_sided};
+    if (asked.radius_px) *asked.radius_px /= all;
+    asked.recorded_px = all;
+    return asked;
+  }
+
   // Whether beads will be searched in frames like this one, as the trial would search its part. In a frame that is
   // larger than the part this is worth its time if they are expected to be found by their faces.
   [[nodiscard]] bool searches_all(const GrayFrame& picture, const SurveyOptions& options) const {
@@ -302,8 +324,8 @@ void keep_most_telling(std::vector<OtherChannel>& others) {
 
 // Where this channel shows the beads plainly, a look at the rims excludes the others.
 std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, const SurveyCandidate& best,
-                                               const SurveyOptions& options, const ChannelTrials& trials,
-                                               bool here_is_plain) {
+                                               const SurveyOptions& options, bool here_is_plain) {
+  const ChannelTrials trials(frames, best, options, glance_side_px);
   std::vector<OtherChannel> others;
   for (const ChannelFrames::One& one : frames.channels) {
     if (one.channel == best.channel) continue;
@@ -326,7 +348,7 @@ std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, cons
 }  // namespace
 
 SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidate& best, const SurveyOptions& options) {
-  const ChannelTrials trials(frames, best, options);
+  const ChannelTrials trials(frames, best, options, options.channel_alone ? glance_side_px : trial_side_px);
   const auto first = std::find_if(frames.channels.begin(), frames.channels.end(),
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
   const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
@@ -336,7 +358,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   settled.by_rims = most.by_rims;
   settled.searched = most.searched;
   const bool plain = most.plain();
-  for (OtherChannel& other : others_worth_a_trial(frames, best, options, trials, plain)) {
+  for (OtherChannel& other : others_worth_a_trial(frames, best, options, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
     const double wanted = clearly_more * most.expected, missing = wanted - most.expected;
     if (plain && trials.rims_beside(most.disks, *other.frame, options.polarity, missing) <= missing) continue;
@@ -350,6 +372,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
     settled.searched.reset();
     most = std::move(there);
   }
+  if (large && settled.by_rims && !options.roi) trials.try_faces_in_all(settled, options);
   return settled;
 }
 

@@ -19,8 +19,6 @@ namespace {
 // px, radius in a reduced frame. Of a photograph with 190 photoelastic disks of two sizes, rims show 64 at 12 px, 176
 // at 16 px and 210 at 24 px (sums of probabilities; disks cut by the border included).
 constexpr double enough_radius_px = 12, enough_for_rims_px = 24;
-// Where a frame still has more pixels than a survey looks at: the radius at which faces are tried (settle_channel.cpp).
-constexpr double least_radius_px = 9;
 // px: of wider beads in a smaller frame. Two coins of 340 px were searched for 33 s; the centre of a rim of 100 px is
 // known to far less than a hundredth of its radius.
 constexpr double wide_radius_px = 100;
@@ -96,12 +94,6 @@ Survey survey_of(GrayFrame& frame, const FindOptions& options) {
   const Survey survey = take_survey(frames, survey_options(options));
   frame = std::move(frames.channels.front().frame);
   return survey;
-}
-
-// The most credible kind of beads, where they are.
-void look_for(const SurveyCandidate& best, FindOptions& find) {
-  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided};
-  if (!find.roi) find.roi = best.region;
 }
 
 void warn_of_part(const std::optional<PixelRectangle>& region, std::vector<std::string>& warnings) {
@@ -233,6 +225,12 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
       1e3 * bead_diameter_m, given, seen, 1e3 * bead_diameter_m / seen);
 }
 
+void look_for(const SurveyCandidate& best, int width, int height, FindOptions& find) {
+  const bool all_was_tried = static_cast<double>(width) * height > large_frame_pixels && !find.roi && !best.region;
+  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided, all_was_tried && best.by_rims};
+  if (!find.roi) find.roi = best.region;
+}
+
 int reduction_for(int width, int height, double radius_px, bool by_rims) {
   const double pixels = static_cast<double>(width) * height;
   if (pixels <= large_frame_pixels) return std::max(1, static_cast<int>(radius_px / wide_radius_px));
@@ -242,7 +240,7 @@ int reduction_for(int width, int height, double radius_px, bool by_rims) {
   };
   int by = std::max(1, static_cast<int>(radius_px / (by_rims ? enough_for_rims_px : enough_radius_px)));
   if (!by_rims)
-    by = std::max(by, std::min(static_cast<int>(radius_px / least_radius_px), by_pixels(most_surveyed_pixels)));
+    by = std::max(by, std::min(static_cast<int>(radius_px / trial_radius_px), by_pixels(most_surveyed_pixels)));
   return std::max(by, by_pixels(most_pixels));
 }
 
@@ -297,7 +295,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
     const Survey survey = survey_of(frame, options);
     out.message = survey.why_not;
     if (!survey.found) return out;
-    look_for(survey.candidates.front(), find);
+    look_for(survey.candidates.front(), frame.width, frame.height, find);
     region = survey.candidates.front().region;
   }
   CalibrationResult learned = learn_beads({&frame}, find);
@@ -337,7 +335,7 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
-      look_for(look->survey.candidates.front(), measure.find);
+      look_for(look->survey.candidates.front(), look->width, look->height, measure.find);
       region = look->survey.candidates.front().region;
       if (const std::string why = scale_objection(measure); !why.empty())
         return refused(FindStatus::bad_input, look->path + ": " + why);
@@ -368,7 +366,7 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
     GrayFrame first = frame_of(images.front());
     const Survey survey = survey_of(first, options.find);
     if (!survey.found) return refused(FindStatus::no_beads, "no beads: " + survey.why_not);
-    look_for(survey.candidates.front(), measure.find);
+    look_for(survey.candidates.front(), first.width, first.height, measure.find);
     region = survey.candidates.front().region;
     if (const std::string why = scale_objection(measure); !why.empty()) return refused(FindStatus::bad_input, why);
   }

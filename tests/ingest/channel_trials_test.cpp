@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
@@ -198,6 +199,45 @@ TEST(ChannelTrials, CountOfASearchInAllTheFrameTheBeadsOfThePart) {
   EXPECT_NE(wide.settled(asked).searched, nullptr);
   wide.best.explained_share = 0.4;
   EXPECT_EQ(wide.settled(asked).searched, nullptr) << "they may have to be found by their rims";
+}
+
+// Two rows of beads, wider than the part that trials look at. Of the 34 beads there three are hollow, so that rims are
+// taken; of all 64 that is less than one in twenty. A large frame is searched in full, and what is found is kept.
+TEST(ChannelTrials, OfALargeFrameTryFacesInAllOfIt) {
+  std::vector<RenderedDisk> all, seen;
+  for (int k = 0; k < 64; ++k) all.push_back({16 + 28.0 * (k / 2), 16 + 28.0 * (k % 2), 9, 0, 0});
+  seen.assign(all.begin(), all.begin() + 34);
+  GrayFrame frame = render_frame(
+      all, {.width = 900, .height = 60, .background_level = 150, .bead_level = 70, .blur_px = 0.8, .read_noise = 2});
+  const std::vector<RenderedDisk> hollow = {all[6], all[15], all[24]};
+  for (const RenderedDisk& disk : hollow)
+    for (int row = 0; row < frame.height; ++row)
+      for (int column = 0; column < frame.width; ++column)
+        if (std::hypot(column - disk.x_px, row - disk.y_px) < 6.5) test::set(frame, column, row, 150);
+  const auto settled = [&](int by, const SurveyOptions& options) {
+    TrialFrames wide(seen, {}, 230, by);
+    wide.frames.width = 900 * by, wide.frames.height = 60 * by;
+    wide.frames.channels[0].frame = wide.frames.channels[1].frame = frame;
+    return wide.settled(options);
+  };
+  SurveyOptions asked;
+  EXPECT_TRUE(settled(6, asked).by_rims) << "1.9 million pixels";
+  EXPECT_FALSE(settled(7, asked).by_rims);
+  EXPECT_EQ(settled(7, asked).searched, nullptr);
+  asked.search.emplace();
+  asked.search->radius_px = 63;
+  const SurveyCandidate large = settled(7, asked);
+  EXPECT_FALSE(large.by_rims);
+  ASSERT_NE(large.searched, nullptr);
+  EXPECT_EQ(large.searched->reduction(), 7);
+  FindOptions find;
+  find.seen = BeadsSeen{Polarity::dark_beads, 9};
+  find.radius_px = 9, find.recorded_px = 7;
+  const auto learned = large.searched->take(frame, find);
+  ASSERT_TRUE(learned && learned->in_last_frame);
+  EXPECT_EQ(learned->in_last_frame->disks.size(), 61U);
+  asked.roi = PixelRectangle{0, 0, 7 * 476, 7 * 60};
+  EXPECT_TRUE(settled(7, asked).by_rims) << "all of the frame is not asked for";
 }
 
 // Blue shows one bead more than green does, but by its rim alone.

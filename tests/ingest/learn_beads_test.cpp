@@ -71,6 +71,18 @@ TEST(LearnBeads, TakesFacesWhileTheyMissFewRims) {
   }
 }
 
+TEST(LearnBeads, TriesNoFacesWhereTrialsFoundRimsAlone) {
+  const std::vector<RenderedDisk> disks = faced_disks(24);
+  const GrayFrame frame = faced_frame(disks);
+  FindOptions options = seen_dark();
+  EXPECT_FALSE(learn_beads({&frame}, options).calibration.by_rims);
+  options.seen->by_rims = true;
+  const CalibrationResult learned = learn_beads({&frame}, options);
+  ASSERT_TRUE(learned.found && learned.in_last_frame);
+  EXPECT_TRUE(learned.calibration.by_rims);
+  EXPECT_EQ(learned.in_last_frame->disks.size(), 24U);
+}
+
 // Of the circles by rims alone: what each is, from its rim.
 TEST(LearnBeads, ByRimsHasTheNumbersOfItsRims) {
   const std::vector<RenderedDisk> disks = faced_disks(24);

@@ -153,6 +153,28 @@ TEST(Photographs, DoubtBeginsAtTwoPercentAndForbidsAtTwenty) {
   EXPECT_EQ(doubt_of_missed(0.401), Doubt::too_many);
 }
 
+// Faces are left untried where all of a large picture was asked for them.
+TEST(Photographs, AreSearchedForWhatTheSurveySaw) {
+  SurveyCandidate best;
+  best.rims.polarity = Polarity::dark_beads, best.rims.radius_px = 31, best.one_sided = true;
+  const auto looked_for = [&](int width, FindOptions find = {}) {
+    look_for(best, width, 1000, find);
+    return find;
+  };
+  EXPECT_EQ(*looked_for(2001).seen, (BeadsSeen{Polarity::dark_beads, 31, true, false}));
+  best.by_rims = true;
+  EXPECT_EQ(*looked_for(2001).seen, (BeadsSeen{Polarity::dark_beads, 31, true, true}));
+  EXPECT_FALSE(looked_for(2000).seen->by_rims);
+  const PixelRectangle given{1, 2, 3, 4}, seen{5, 6, 7, 8};
+  FindOptions asked;
+  asked.roi = given;
+  EXPECT_FALSE(looked_for(2001, asked).seen->by_rims);
+  best.region = seen;
+  EXPECT_FALSE(looked_for(2001).seen->by_rims);
+  EXPECT_EQ(*looked_for(2001).roi, seen);
+  EXPECT_EQ(*looked_for(2001, asked).roi, given);
+}
+
 TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
   EXPECT_EQ(reduction_for(1000, 1000, 90), 1) << "the frame is small";
   EXPECT_EQ(reduction_for(1500, 800, 340), 3) << "the beads are so wide that a third of the pixels is enough";
