@@ -37,6 +37,9 @@ constexpr double least_explained =
 constexpr double least_side = 0.15;
 constexpr double one_sided_support = 0.6, one_sided_explained = 0.4, one_sided_by_chance = 0.02;
 constexpr double fewest_one_sided = 20;
+// Where the radius is given, so many of it that make up this share of the edges are enough.
+constexpr double one_sided_explained_if_given = 0.25;
+constexpr const char* one_side_missing = "one side of the rim is missing from all circles";
 // Radii, over which the level changes at a rim: beads up to 0.44, softly enlarged ones 0.73, noise smoothed over a
 // length 1.4, blurred spots 1.6. Spots are beads where they, and little else, make up the picture.
 constexpr double widest_rim = 1.1, spots_explained = 0.5;
@@ -174,6 +177,12 @@ void judge_shape(SurveyCandidate& candidate, const Roundness& roundness, bool an
     candidate.why_not = candidate.why_not_round;
 }
 
+// Whether circles without one side would be believed if their radius were given.
+bool lit_if_given(const SurveyCandidate& candidate) {
+  return static_cast<double>(candidate.disks.size()) >= fewest_one_sided &&
+         candidate.explained_share >= one_sided_explained_if_given;
+}
+
 void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
   double support = 0;
   for (const RimDisk& disk : candidate.disks) {
@@ -188,8 +197,9 @@ void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
   const double wrong = candidate.expected_wrong * count;
   const double at_worst = share_by_chance_at_worst(wrong, count);
   candidate.one_sided = least_seen_side(candidate.disks) < least_side;
-  const bool lit_from_one_side = count >= fewest_one_sided && support >= one_sided_support * count &&
-                                 candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
+  const bool plainly_lit = count >= fewest_one_sided && support >= one_sided_support * count &&
+                           candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
+  const bool lit_from_one_side = plainly_lit || (given && lit_if_given(candidate));
   if (candidate.disks.empty())
     candidate.why_not = "no circles are seen beyond what chance gives";
   else if (at_worst > most_by_chance || (!given && at_worst > few_wrong && candidate.explained_share < good_part))
@@ -198,7 +208,7 @@ void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
     candidate.why_not = formatted("only %.0f circles are seen, and only %.0f %% of their rims is visible", count,
                                   100 * support / count);
   else if (candidate.one_sided && !lit_from_one_side)
-    candidate.why_not = "one side of the rim is missing from all circles";
+    candidate.why_not = one_side_missing;
   else if (candidate.explained_share < least_explained) {
     candidate.few_edges = true;
     candidate.why_not = formatted("the rims of the circles make up only %.1f %% of the edges in the picture",
@@ -376,7 +386,8 @@ SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis
   candidate.rims = std::move(learned.model);
   candidate.disks = std::move(learned.disks);
   judge(candidate, learned.edge_length_px, given);
-  candidate.plausible = candidate.why_not.empty() && candidate.rims.radius_px <= asked.largest_px;
+  const bool may_be_lit = candidate.why_not == one_side_missing && lit_if_given(candidate);
+  candidate.plausible = (candidate.why_not.empty() || may_be_lit) && candidate.rims.radius_px <= asked.largest_px;
   if (const char* why = why_drawn(asked.signs, candidate.explained_share)) candidate.why_drawn = why;
   if (candidate.why_not.empty() && !asked.options.any_shape) candidate.why_not = candidate.why_drawn;
   if (candidate.why_not.empty()) {

@@ -124,6 +124,25 @@ TEST(SideLitSpheres, OfOtherLooksAreMeasuredOrRefused) {
   expect_measured({{8, 0.35, 0.5, 40, 38}, {12, 0.25, 0.4, 40, 40}, {7, 0.6, 0.5, 52, 50}}, 2);
 }
 
+// Under a low lamp chance could make up too many of the circles. Where their radius is given it is enough that they
+// make up a quarter of the edges: until then they are plausible, and a refusal names the radius.
+TEST(SideLitSpheres, AreBelievedWhereTheirRadiusIsGiven) {
+  const Look low_lamp{9, 0.35, 0.7, 63, 40};
+  ChannelFrames frames;
+  frames.channels.push_back({Channel::grey, drawn(bed_in_equilibrium(1, 9, 100)[0], low_lamp, 5)});
+  frames.width = frames.channels[0].frame.width, frames.height = frames.channels[0].frame.height;
+  SurveyOptions options;
+  const Survey unasked = take_survey(frames, options);
+  EXPECT_FALSE(unasked.found);
+  EXPECT_EQ(unasked.why_not, "one side of the rim is missing from all circles");
+  const SurveyCandidate& seen = unasked.candidates.front();
+  EXPECT_TRUE(seen.one_sided && seen.plausible && !seen.credible);
+  options.radius_px = seen.rims.radius_px;
+  const Survey given = take_survey(frames, options);
+  ASSERT_TRUE(given.found) << given.why_not;
+  EXPECT_NEAR(static_cast<double>(given.candidates.front().disks.size()), 93, 5);
+}
+
 // All beads are found, and between those that touch a wall or the floor short pieces of its edge are seen: no place of
 // a missed bead. Where beads are left out, at a wall and elsewhere, they are missed.
 TEST(MissedBeads, AreNoPiecesOfWallsBetweenBeads) {
