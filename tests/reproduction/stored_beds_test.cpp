@@ -20,14 +20,14 @@ TEST(Inference, RunsTheStoredBedsAgain) {
   const std::string recipe = project + "/pipelines/recipes/clement-rajchenbach/infer.json";
   const ProgramResult result = run_shakebed(
       {"run", recipe, "--out", "out", "--jobs", "2", "--set", "/stages/posterior/stored=\"\"", "--set",
-       "/stages/posterior/first=16", "--set", "/stages/posterior/rounds=0", "--set", "/stages/posterior/best=0"},
+       "/stages/posterior/first=24", "--set", "/stages/posterior/rounds=0", "--set", "/stages/posterior/best=0"},
       folder.path());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json again = read_json(folder / "out/posterior/beds.json")["beds"];
   const Json stored =
       read_json(project + "/reference-data/quinn-hong-2000/measured/clement-rajchenbach-beds.json")["beds"];
-  ASSERT_EQ(again.size(), 16U);
-  for (std::size_t i = 0; i < 16; ++i) {
+  ASSERT_EQ(again.size(), 24U);
+  for (std::size_t i = 0; i < 24; ++i) {
     EXPECT_EQ(again[i]["values"], stored[i]["values"]);
     ASSERT_EQ(again[i]["numbers"].size(), stored[i]["numbers"].size());
     for (std::size_t k = 0; k < again[i]["numbers"].size(); ++k) {
