@@ -169,8 +169,7 @@ class ChannelTrials {
     Trial trial = tried(picture, find, learned, shades);
     keep_to_part(trial);
     if (learned.found && !learned.calibration.by_rims)
-      trial.searched =
-          std::make_shared<SearchedFrame>(picture, frames_.reduction, std::move(asked), std::move(learned));
+      trial.searched = std::make_shared<SearchedFrame>(picture, frames_.reduction, asked, std::move(learned));
     return trial;
   }
 
@@ -186,8 +185,8 @@ class ChannelTrials {
     CalibrationResult learned = learn_beads({&all}, find);
     settled.by_rims = !learned.found || learned.calibration.by_rims;
     if (!settled.by_rims && options.search)
-      settled.searched = std::make_shared<SearchedFrame>(std::move(all), frames_.reduction * factor_, std::move(asked),
-                                                         std::move(learned));
+      settled.searched =
+          std::make_shared<SearchedFrame>(std::move(all), frames_.reduction * factor_, asked, std::move(learned));
   }
 
   // What a quick search by rims finds.
@@ -306,6 +305,7 @@ struct OtherChannel {
 // have both signs.
 void keep_most_telling(std::vector<OtherChannel>& others) {
   std::vector<double> ranked;
+  ranked.reserve(others.size());
   for (const OtherChannel& other : others) ranked.push_back(other.by_rims);
   std::sort(ranked.begin(), ranked.end(), std::greater<>());
   std::size_t kept = 0;
