@@ -149,7 +149,8 @@ Posterior further_round(const Posterior& before, const LogLikelihood& log_likeli
 std::vector<double> even_points(std::size_t dimensions, std::size_t count, std::uint64_t seed) {
   // GSL itself gives a sequence of more dimensions, all of whose points are the same.
   if (dimensions < 1 || dimensions > gsl_qrng_sobol->max_dimension)
-    throw std::invalid_argument("even_points: " + std::to_string(dimensions) + " dimensions; there must be 1 to 40");
+    throw std::invalid_argument("even_points: " + std::to_string(dimensions) + " dimensions; there must be 1 to " +
+                                std::to_string(gsl_qrng_sobol->max_dimension));
   const std::unique_ptr<gsl_qrng, void (*)(gsl_qrng*)> sequence(
       gsl_qrng_alloc(gsl_qrng_sobol, static_cast<unsigned>(dimensions)), gsl_qrng_free);
   std::mt19937_64 generator(seed);

@@ -40,7 +40,7 @@ struct BeadsSeen {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   bool one_sided = false;  // one side of the rim is hardly seen: the radius is that of a part of the bead
-  bool by_rims = false;    // trials found them by their rims alone: faces are not tried again
+  bool no_faces = false;   // all of the picture was searched for their faces in vain
   bool operator==(const BeadsSeen&) const = default;
 };
 

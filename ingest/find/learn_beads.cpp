@@ -448,7 +448,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   // Faces do not show whether things are round.
   const GapModel& gaps = *rims.model.gaps;
   const bool of_one_size = gaps.other_sizes.empty() && gaps.not_round.empty();
-  if (!options.seen->by_rims) {
+  if (!options.seen->no_faces) {
     if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
     if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
   }

@@ -173,8 +173,8 @@ class ChannelTrials {
     return trial;
   }
 
-  // Of a candidate whose beads were found by their rims in the part: by their faces, if all of the frame shows these.
-  // In the part beads may hide all ground.
+  // Of a candidate whose beads were found by their rims in the part: whether all of the frame shows faces. In the part
+  // beads may hide all ground.
   void try_faces_in_all(SurveyCandidate& settled, const SurveyOptions& options) const {
     const auto chosen = std::find_if(frames_.channels.begin(), frames_.channels.end(),
                                      [&](const ChannelFrames::One& one) { return one.channel == settled.channel; });
@@ -183,7 +183,7 @@ class ChannelTrials {
     FindOptions find = asked;
     find.quick_rims = true;  // which faces do not depend on
     CalibrationResult learned = learn_beads({&all}, find);
-    settled.by_rims = !learned.found || learned.calibration.by_rims;
+    settled.by_rims = settled.no_faces = !learned.found || learned.calibration.by_rims;
     if (!settled.by_rims && options.search)
       settled.searched =
           std::make_shared<SearchedFrame>(std::move(all), frames_.reduction * factor_, asked, std::move(learned));

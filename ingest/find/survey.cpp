@@ -594,9 +594,9 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
     SurveyOptions in_region = options;
     if (!options.roi) in_region.roi = survey.candidates.front().region;
     SurveyCandidate settled = settle_channel(frames, survey.candidates.front(), in_region);
-    survey.candidates.front().by_rims = settled.by_rims;
-    survey.candidates.front().searched = settled.searched;
-    if (settled.channel != survey.candidates.front().channel)
+    if (settled.channel == survey.candidates.front().channel)
+      survey.candidates.front() = std::move(settled);
+    else
       survey.candidates.insert(survey.candidates.begin(), std::move(settled));
   }
   if (!survey.found) survey.why_not = why_none(survey);

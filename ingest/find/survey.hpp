@@ -38,17 +38,17 @@ struct SurveyCandidate {
   double gain_px = 0;          // length of rims that beads explain, less a cost for each bead
   double explained_share = 0;  // of all edges at this scale
   double expected_wrong = 0;   // share of the disks
-  // Beads will be found by their rims alone, as far as a trial showed: of all of a large picture, if no region is
-  // given.
-  bool by_rims = false;
-  bool one_sided = false;     // one side of the rim is hardly seen in any: light from the other side
-  bool not_round = false;     // circles are seen, but on outlines that are not round ...
-  std::string why_not_round;  // ... a sentence
-  std::string why_drawn;      // marks of a plot or a drawing, a sentence; empty: they may be beads
-  bool credible = false;      // "no beads here" does not explain the picture as well
-  std::string why_not;        // a sentence, unless credible
-  bool few_edges = false;     // they may be beads, but other things make up the picture
-  // The circles are no chance, so they may be beads of another shape, or smaller than those that are believed unasked.
+  bool by_rims = false;        // beads will be found by their rims alone, as far as a trial showed
+  bool no_faces = false;       // all of a large picture, reduced, was searched for their faces in vain
+  bool one_sided = false;      // one side of the rim is hardly seen in any: light from the other side
+  bool not_round = false;      // circles are seen, but on outlines that are not round ...
+  std::string why_not_round;   // ... a sentence
+  std::string why_drawn;       // marks of a plot or a drawing, a sentence; empty: they may be beads
+  bool credible = false;       // "no beads here" does not explain the picture as well
+  std::string why_not;         // a sentence, unless credible
+  bool few_edges = false;      // they may be beads, but other things make up the picture
+  // The circles are no chance, so they may be beads of another shape, smaller than those that are believed unasked, or
+  // lit from one side.
   bool plausible = false;
   // Where the rest of the picture shows something else, the part in which the beads are; px of the full frame.
   std::optional<PixelRectangle> region;

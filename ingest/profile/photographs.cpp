@@ -225,9 +225,8 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
       1e3 * bead_diameter_m, given, seen, 1e3 * bead_diameter_m / seen);
 }
 
-void look_for(const SurveyCandidate& best, int width, int height, FindOptions& find) {
-  const bool all_was_tried = static_cast<double>(width) * height > large_frame_pixels && !find.roi && !best.region;
-  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided, all_was_tried && best.by_rims};
+void look_for(const SurveyCandidate& best, FindOptions& find) {
+  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided, best.no_faces};
   if (!find.roi) find.roi = best.region;
 }
 
@@ -295,7 +294,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
     const Survey survey = survey_of(frame, options);
     out.message = survey.why_not;
     if (!survey.found) return out;
-    look_for(survey.candidates.front(), frame.width, frame.height, find);
+    look_for(survey.candidates.front(), find);
     region = survey.candidates.front().region;
   }
   CalibrationResult learned = learn_beads({&frame}, find);
@@ -335,7 +334,7 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
-      look_for(look->survey.candidates.front(), look->width, look->height, measure.find);
+      look_for(look->survey.candidates.front(), measure.find);
       region = look->survey.candidates.front().region;
       if (const std::string why = scale_objection(measure); !why.empty())
         return refused(FindStatus::bad_input, look->path + ": " + why);
@@ -366,7 +365,7 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
     GrayFrame first = frame_of(images.front());
     const Survey survey = survey_of(first, options.find);
     if (!survey.found) return refused(FindStatus::no_beads, "no beads: " + survey.why_not);
-    look_for(survey.candidates.front(), first.width, first.height, measure.find);
+    look_for(survey.candidates.front(), measure.find);
     region = survey.candidates.front().region;
     if (const std::string why = scale_objection(measure); !why.empty()) return refused(FindStatus::bad_input, why);
   }

@@ -74,8 +74,8 @@ inline constexpr std::size_t most_tried = 10;
 std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
                                        const FrameSourceOptions& source = {});
 
-// What a survey of a picture of this size saw becomes what is searched for, and where.
-void look_for(const SurveyCandidate& best, int width, int height, FindOptions& find);
+// What a survey saw becomes what is searched for, and where.
+void look_for(const SurveyCandidate& best, FindOptions& find);
 
 // Why a length of a pixel cannot be that of a picture with circles of this radius; empty when it can. Within a factor
 // of three the circles may be the bright middle of beads, or hold their shadow, and the scale is believed.

@@ -149,7 +149,7 @@ const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const Ext
 void go_on_with(const ingest::SurveyCandidate& chosen, const FirstLook& look, ingest::FrameSourceOptions& source,
                 ingest::MeasureOptions& measure) {
   source.channel = chosen.channel;
-  ingest::look_for(chosen, look.width, look.height, measure.find);
+  ingest::look_for(chosen, measure.find);
   source.reduction = measure.reduction = ingest::reduction_after(look, chosen);
   measure.searched = chosen.searched;
 }

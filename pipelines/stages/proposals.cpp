@@ -7,6 +7,8 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "ingest/find/nearby.hpp"
@@ -140,13 +142,16 @@ class Proposer {
             });
   }
 
+  // Candidates of the same beads lead to the same, which is proposed once.
   void give_beads(const ingest::SurveyCandidate& candidate) {
     std::vector<std::string> instead;
     for (const std::string& name : given_)
       if (name == "--polarity" || name == "--radius" || name == "--shape" ||
           (name == "--channel" && candidate.channel != ingest::Channel::automatic))
         instead.push_back(name);
-    propose(instead, options_for(candidate), [&](ExtractOptions& o) { take_candidate(candidate, o); });
+    if (propose(instead, options_for(candidate), [&](ExtractOptions& o) { take_candidate(candidate, o); }) &&
+        !beads_given_.insert(proposals_.back().seen).second)
+      proposals_.pop_back();
   }
 
   // Whether the beads measured do not touch: a scale, or any shape, then helps as well as other options.
@@ -251,6 +256,7 @@ class Proposer {
   double reduced_for_px_ = 0;
   std::vector<std::string> given_;
   std::vector<Proposal> proposals_;
+  std::set<std::string> beads_given_;  // what the proposals of candidates found
   std::size_t tries_ = 0, searches_ = 0;
 };
 

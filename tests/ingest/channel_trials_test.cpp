@@ -209,12 +209,12 @@ TEST(ChannelTrials, OfALargeFrameTryFacesInAllOfIt) {
   seen.assign(all.begin(), all.begin() + 34);
   GrayFrame frame = render_frame(
       all, {.width = 900, .height = 60, .background_level = 150, .bead_level = 70, .blur_px = 0.8, .read_noise = 2});
-  const std::vector<RenderedDisk> hollow = {all[6], all[15], all[24]};
-  for (const RenderedDisk& disk : hollow)
-    for (int row = 0; row < frame.height; ++row)
-      for (int column = 0; column < frame.width; ++column)
-        if (std::hypot(column - disk.x_px, row - disk.y_px) < 6.5) test::set(frame, column, row, 150);
+  std::vector<RenderedDisk> hollow = {all[6], all[15], all[24]};
   const auto settled = [&](int by, const SurveyOptions& options) {
+    for (const RenderedDisk& disk : hollow)
+      for (int row = 0; row < frame.height; ++row)
+        for (int column = 0; column < frame.width; ++column)
+          if (std::hypot(column - disk.x_px, row - disk.y_px) < 6.5) test::set(frame, column, row, 150);
     TrialFrames wide(seen, {}, 230, by);
     wide.frames.width = 900 * by, wide.frames.height = 60 * by;
     wide.frames.channels[0].frame = wide.frames.channels[1].frame = frame;
@@ -222,7 +222,8 @@ TEST(ChannelTrials, OfALargeFrameTryFacesInAllOfIt) {
   };
   SurveyOptions asked;
   EXPECT_TRUE(settled(6, asked).by_rims) << "1.9 million pixels";
-  EXPECT_FALSE(settled(7, asked).by_rims);
+  EXPECT_FALSE(settled(6, asked).no_faces) << "of the part alone";
+  EXPECT_FALSE(settled(7, asked).by_rims || settled(7, asked).no_faces);
   EXPECT_EQ(settled(7, asked).searched, nullptr);
   asked.search.emplace();
   asked.search->radius_px = 63;
@@ -237,7 +238,13 @@ TEST(ChannelTrials, OfALargeFrameTryFacesInAllOfIt) {
   ASSERT_TRUE(learned && learned->in_last_frame);
   EXPECT_EQ(learned->in_last_frame->disks.size(), 61U);
   asked.roi = PixelRectangle{0, 0, 7 * 476, 7 * 60};
-  EXPECT_TRUE(settled(7, asked).by_rims) << "all of the frame is not asked for";
+  const SurveyCandidate in_part = settled(7, asked);
+  EXPECT_TRUE(in_part.by_rims && !in_part.no_faces) << "all of the frame is not asked for";
+  asked.roi.reset();
+  for (std::size_t k = 40; k < all.size(); k += 4) hollow.push_back(all[k]);
+  const SurveyCandidate without = settled(7, asked);
+  EXPECT_TRUE(without.by_rims && without.no_faces) << "9 of 64 are hollow";
+  EXPECT_EQ(without.searched, nullptr);
 }
 
 // Blue shows one bead more than green does, but by its rim alone.

@@ -71,12 +71,12 @@ TEST(LearnBeads, TakesFacesWhileTheyMissFewRims) {
   }
 }
 
-TEST(LearnBeads, TriesNoFacesWhereTrialsFoundRimsAlone) {
+TEST(LearnBeads, TriesNoFacesWhereThereAreNone) {
   const std::vector<RenderedDisk> disks = faced_disks(24);
   const GrayFrame frame = faced_frame(disks);
   FindOptions options = seen_dark();
   EXPECT_FALSE(learn_beads({&frame}, options).calibration.by_rims);
-  options.seen->by_rims = true;
+  options.seen->no_faces = true;
   const CalibrationResult learned = learn_beads({&frame}, options);
   ASSERT_TRUE(learned.found && learned.in_last_frame);
   EXPECT_TRUE(learned.calibration.by_rims);

@@ -153,26 +153,23 @@ TEST(Photographs, DoubtBeginsAtTwoPercentAndForbidsAtTwenty) {
   EXPECT_EQ(doubt_of_missed(0.401), Doubt::too_many);
 }
 
-// Faces are left untried where all of a large picture was asked for them.
 TEST(Photographs, AreSearchedForWhatTheSurveySaw) {
   SurveyCandidate best;
   best.rims.polarity = Polarity::dark_beads, best.rims.radius_px = 31, best.one_sided = true;
-  const auto looked_for = [&](int width, FindOptions find = {}) {
-    look_for(best, width, 1000, find);
-    return find;
-  };
-  EXPECT_EQ(*looked_for(2001).seen, (BeadsSeen{Polarity::dark_beads, 31, true, false}));
+  FindOptions find;
+  look_for(best, find);
+  EXPECT_EQ(*find.seen, (BeadsSeen{Polarity::dark_beads, 31, true, false}));
+  EXPECT_FALSE(find.roi);
   best.by_rims = true;
-  EXPECT_EQ(*looked_for(2001).seen, (BeadsSeen{Polarity::dark_beads, 31, true, true}));
-  EXPECT_FALSE(looked_for(2000).seen->by_rims);
-  const PixelRectangle given{1, 2, 3, 4}, seen{5, 6, 7, 8};
-  FindOptions asked;
-  asked.roi = given;
-  EXPECT_FALSE(looked_for(2001, asked).seen->by_rims);
-  best.region = seen;
-  EXPECT_FALSE(looked_for(2001).seen->by_rims);
-  EXPECT_EQ(*looked_for(2001).roi, seen);
-  EXPECT_EQ(*looked_for(2001, asked).roi, given);
+  look_for(best, find);
+  EXPECT_FALSE(find.seen->no_faces) << "a trial of a part";
+  best.no_faces = true, best.region = PixelRectangle{5, 6, 7, 8};
+  look_for(best, find);
+  EXPECT_TRUE(find.seen->no_faces);
+  EXPECT_EQ(*find.roi, *best.region);
+  find.roi = PixelRectangle{1, 2, 3, 4};
+  look_for(best, find);
+  EXPECT_EQ(*find.roi, (PixelRectangle{1, 2, 3, 4})) << "as given";
 }
 
 TEST(Photographs, LargeFramesAreReducedToARadiusOfTwelveToTwentyFour) {
