@@ -12,6 +12,7 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
+#include "ingest/find/packed_bed.hpp"
 #include "ingest/frames/smooth_field.hpp"
 #include "statistics/ranks.hpp"
 
@@ -26,8 +27,8 @@ constexpr int trial_side_px = 480;
 constexpr int glance_side_px = 320;
 constexpr double clearly_more = 1.03;  // times as many beads, for a change of channel
 // The same, for a change from faces to rims: their centres may be wrong by a tenth of a radius, so that they have to
-// show another tenth of the beads.
-constexpr double far_more = 1.1;
+// show another tenth of the beads. From rims to faces more is enough.
+constexpr double far_more = 1.1, any_more = 1;
 constexpr double inside = 0.8, outside = 1.15,
                  farthest_behind = 1.3;  // radii: where a face and what is behind it are seen
 constexpr double least_contrast = 4;     // grey levels between the two
@@ -43,14 +44,17 @@ constexpr double sure_rim = 0.9, nearest_of_another = 1.6;
 // Of a radius: beads that are plainly seen here, and are of another radius there, are not the same.
 constexpr double another_size = 0.12;
 
+// Radii: neighbours that are nearer may touch, and those that are farther apart do not, however alike their distances.
+constexpr double nearest_apart = 1.05, farthest_apart = 1.3;
+
 // Two channels of which one tells this share of the other's variance show the same beads.
 constexpr double the_same = 0.998;
 
 // Rims of the sign that most beads have not; fewer say nothing about a channel.
 constexpr double fewest_of_other_sign = 3;
 
-// Of the other channels, those in which a quick search by rims expects most beads are searched as thoroughly as this
-// one.
+// Of the other channels, those in which a quick search by rims shows most of the beads are searched as thoroughly as
+// this one.
 constexpr std::size_t most_channels = 2;
 
 // Beads that are so many, so much of all edges and so sure are expected to be found by their faces.
@@ -66,19 +70,39 @@ struct Trial {
   bool by_rims = true;
   double wrong = 1, missed = 1;  // shares that are expected, of the disks and of the beads
   std::shared_ptr<SearchedFrame> searched;
-  [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly; }
+  // Radius at which most neighbours would touch, over the radius seen. A channel may show no more of shaded spheres
+  // than their bright middle.
+  double apart = 1;
+  [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly || apart > 1; }
   [[nodiscard]] bool plain() const { return !by_rims && !doubtful(); }
-  // Beads found, less the disks that are none: a wrong disk is as bad as a bead that is missed.
-  [[nodiscard]] double worth() const { return expected - wrong * static_cast<double>(disks.size()); }
+  // Beads found, each by the share of its radius that is seen.
+  [[nodiscard]] double shown() const { return expected / apart; }
+  // The same, less the disks that are none: a wrong disk is as bad as a bead that is missed.
+  [[nodiscard]] double worth() const { return (expected - wrong * static_cast<double>(disks.size())) / apart; }
 };
 
-// Whether a channel in which more beads are expected shows them so well that this one is left for it.
+// Whether another channel shows more of the beads, and so well that this one is left for it.
 bool better_there(const Trial& here, const Trial& there) {
-  if (there.worth() <= (there.by_rims && !here.by_rims ? far_more : clearly_more) * here.worth()) return false;
+  const double faces_or_rims = there.by_rims ? far_more : any_more;
+  const double more = there.by_rims == here.by_rims ? clearly_more : faces_or_rims;
+  if (there.shown() <= std::min(more, clearly_more) * here.shown() || there.worth() <= more * here.worth())
+    return false;
   if (!here.plain()) return true;
   // More disks are found where other things pass as beads, too: these then are less sure. And rims of one sign may be
   // those of the bright middle of some beads.
   return there.wrong < hardly && std::abs(there.radius_px / here.radius_px - 1) < another_size;
+}
+
+double apart_of(const std::vector<FoundDisk>& disks, double radius_px) {
+  std::vector<Circle> circles;
+  for (const FoundDisk& disk : disks) {
+    Circle circle;
+    circle.x = disk.x_px, circle.y = disk.y_px, circle.radius = disk.radius_px;
+    circles.push_back(circle);
+  }
+  const auto touching = touching_radius(circles);
+  const double apart = touching.value_or(radius_px) / radius_px;
+  return apart > nearest_apart && apart < farthest_apart ? apart : 1;
 }
 
 Trial trial_of(const FinderCalibration& learned, const FindResult& found) {
@@ -89,6 +113,7 @@ Trial trial_of(const FinderCalibration& learned, const FindResult& found) {
   trial.missed = learned.expected_missed;
   if (!found.disks.empty()) trial.wrong = 1 - trial.expected / static_cast<double>(found.disks.size());
   trial.disks = found.disks;
+  trial.apart = apart_of(trial.disks, trial.radius_px);
   return trial;
 }
 
@@ -297,12 +322,11 @@ struct OtherChannel {
   Channel channel = Channel::automatic;
   const GrayFrame* frame = nullptr;
   Polarity polarity = Polarity::automatic;
-  // Beads that a quick search by rims expects: of this polarity, and of the other, too.
+  // Beads that a quick search by rims shows: of this polarity, and of the other, too.
   double by_rims = 0, of_both_signs = 0;
 };
 
-// Those in which most beads of one sign are expected by their rims, and the one in which clearly more are expected that
-// have both signs.
+// Those in which rims of one sign show most of the beads, and the one in which rims of both signs show clearly more.
 void keep_most_telling(std::vector<OtherChannel>& others) {
   std::vector<double> ranked;
   ranked.reserve(others.size());
@@ -336,7 +360,7 @@ std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, cons
   if (here_is_plain || others.size() <= most_channels) return others;
   for (OtherChannel& other : others) {
     const Trial rims = trials.found_by_rims(*other.frame, other.polarity);
-    other.by_rims = other.of_both_signs = rims.expected;
+    other.by_rims = other.of_both_signs = rims.shown();
     if (options.polarity == Polarity::automatic)
       other.of_both_signs +=
           trials.rims_beside(rims.disks, *other.frame, opposite(other.polarity), fewest_of_other_sign);
@@ -365,7 +389,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
     if (plain && options.polarity == Polarity::automatic)
       other.polarity = trials.polarity_of_radius(*other.frame, other.polarity, most.radius_px);
     Trial there = trials.trial_in(*other.frame, other.polarity, Shades::all);
-    if (there.expected <= wanted || !better_there(most, there)) continue;
+    if (!better_there(most, there)) continue;
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;
     settled.by_rims = there.by_rims;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "ingest/find/learn_beads.hpp"
@@ -258,6 +259,18 @@ TEST(ChannelTrials, CompareEachChannelWithTheBestSoFar) {
   EXPECT_FALSE(settled.by_rims);
 }
 
+// Of rims nearly all are surely beads, of faces all.
+TEST(ChannelTrials, LeaveRimsForFacesOfAsManyBeads) {
+  const std::vector<RenderedDisk> all = beads_of_trial();
+  TrialFrames beads(all, all, 230);
+  beads.frames.channels[0].frame = rings_of(all);
+  const SurveyCandidate settled = beads.settled();
+  EXPECT_EQ(settled.channel, Channel::green);
+  EXPECT_FALSE(settled.by_rims);
+  beads.frames.channels[1].frame = test::beads_of_level({all.begin(), all.end() - 1}, 230);
+  EXPECT_EQ(beads.settled().channel, Channel::red) << "one bead fewer";
+}
+
 // Red shows rings, so the other channels are tried. Of these, blue and saturation show most dark beads; green shows
 // all, half of them bright.
 TEST(ChannelTrials, CountBeadsOfBothSigns) {
@@ -300,6 +313,41 @@ TEST(ChannelTrials, TakeTheSignWhoseRimsHaveTheRadiusSeen) {
   const SurveyCandidate settled = beads.settled();
   EXPECT_EQ(settled.channel, Channel::green);
   EXPECT_EQ(settled.rims.polarity, Polarity::dark_beads);
+}
+
+// 25 beads at these distances, of which channels show circles of these radii.
+SurveyCandidate settled_of_radii(double distance, const std::vector<std::pair<Channel, double>>& radii) {
+  TrialFrames beads({}, {}, 230);
+  beads.frames.channels.clear();
+  for (const auto& [channel, radius] : radii) {
+    std::vector<RenderedDisk> disks;
+    for (int k = 0; k < 25; ++k)
+      disks.push_back({20 + distance * (k % 5) + (k / 5 % 2) * distance / 2, 16 + 0.87 * distance * (k / 5), radius});
+    beads.frames.channels.push_back({channel, test::beads_of_level(disks, 70)});
+    if (channel != Channel::red) continue;
+    for (const RenderedDisk& disk : disks) {
+      beads.best.disks.emplace_back();
+      beads.best.disks.back().circle.x = disk.x_px, beads.best.disks.back().circle.y = disk.y_px;
+      beads.best.disks.back().circle.radius = radius;
+    }
+    beads.best.rims.radius_px = radius;
+  }
+  return beads.settled();
+}
+
+// Where circles of another channel come nearer to touching, they show more of each bead.
+TEST(ChannelTrials, TakeTheOutlinesThatTouch) {
+  EXPECT_EQ(settled_of_radii(18, {{Channel::red, 7.6}, {Channel::green, 8.8}}).channel, Channel::green);
+  EXPECT_EQ(settled_of_radii(18, {{Channel::red, 8.8}, {Channel::green, 7.6}}).channel, Channel::red);
+  EXPECT_EQ(settled_of_radii(18, {{Channel::red, 8.6}, {Channel::green, 8.8}}).channel, Channel::red)
+      << "a difference that channels of one picture have";
+  EXPECT_EQ(settled_of_radii(
+                18, {{Channel::red, 7.6}, {Channel::green, 7.6}, {Channel::blue, 7.6}, {Channel::saturation, 8.8}})
+                .channel,
+            Channel::saturation)
+      << "of the others two are tried";
+  EXPECT_EQ(settled_of_radii(24, {{Channel::red, 7.6}, {Channel::green, 8.8}}).channel, Channel::red)
+      << "neighbours are too far apart to say anything";
 }
 
 }  // namespace
