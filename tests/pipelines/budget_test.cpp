@@ -530,6 +530,19 @@ TEST(BudgetRun, RefusesATimeInWhichTheBedCannotSettle) {
   EXPECT_THAT(ran.err, HasSubstr("Allow more time"));
 }
 
+// A file lies where the pilot's folder belongs. Nothing is chosen, and nothing is run.
+TEST(BudgetRun, SaysWhyItsPilotFailed) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder / "o" / ".pilot" / "bed" / "0");
+  write_text(folder / "o" / ".pilot" / "bed" / "0" / ".scratch", "");
+  const ProgramResult ran = run_hot(folder, {"--budget", "5 %"});
+  EXPECT_EQ(ran.exit_code, 5) << ran.err;
+  EXPECT_THAT(ran.err,
+              HasSubstr("error: the pilot run of --budget failed: bed (simulate): o/.pilot/bed/0/.scratch/bed/"));
+  EXPECT_THAT(ran.err, Not(HasSubstr("chooses")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "o" / "bed"));
+}
+
 TEST(BudgetRun, NamesTheRecipeThatHasNothingToScale) {
   const ScratchFolder folder;
   write_text(folder / "study.json", R"({"name": "study",
