@@ -296,6 +296,8 @@ TEST(StatedPointers, ThatLeadNowhereAreNamed) {
   EXPECT_EQ(told("/bed/good"),
             "\"bed\" (simulate) does not give \"/good\" with these options. It is given when it is asked for");
   EXPECT_EQ(told("/bed/rows/3"), "\"/bed/rows/3\" refers to several results, not to one. Choose from: /rows/3/height");
+  EXPECT_EQ(told("/bed/rows"), "\"/bed/rows\" refers to several results, not to one. Choose from: /rows/#/height");
+  EXPECT_EQ(told("/bed/series"), "\"/bed/series\" refers to several results, not to one. Choose from: /series/*/name");
   EXPECT_EQ(told("/bed/temperatur"),
             "\"bed\" (simulate) gives no result \"/temperatur\". Did you mean \"/bed/temperature\"?");
   EXPECT_EQ(told("/bed/qqqqqqqqqqqq"),

@@ -514,6 +514,11 @@ TEST(SpeciesByHand, HaveTheErrorOfTheirRatio) {
 // ---------------------------------------------------------------------------------------------------------------------
 // order
 
+TEST(OrderByHand, OfNoDisksIsEmpty) {
+  const BondOrder order = bond_order({}, {}, 5, 0);
+  EXPECT_TRUE(order.neighbours.empty() && order.psi6_re.empty() && order.vacancy_x.empty());
+}
+
 // Neighbours and psi_6 of every disk by asking all others and all their images.
 TEST(OrderByHand, IsThatOfAllPairs) {
   for (const auto& [width, height] : {std::array{3.9, 0.0}, {8.3, 6.1}, {0.0, 0.0}, {4.4, 11.0}}) {
