@@ -336,6 +336,13 @@ std::vector<std::string> FindOptions::validate() const {
   return problems;
 }
 
+std::vector<Circle> circles_of(const std::vector<FoundDisk>& disks) {
+  std::vector<Circle> circles(disks.size());
+  for (std::size_t k = 0; k < disks.size(); ++k)
+    circles[k].x = disks[k].x_px, circles[k].y = disks[k].y_px, circles[k].radius = disks[k].radius_px;
+  return circles;
+}
+
 FindResult find_disks(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
   require_consistent(frame);
   if (frame.width != calibration.width || frame.height != calibration.height) {

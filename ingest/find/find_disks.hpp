@@ -35,6 +35,9 @@ struct FoundDisk {
   bool half_hidden = false;               // part of it does not look like a bead: covered, out of focus, in shadow
 };
 
+// Their places and radii alone.
+std::vector<Circle> circles_of(const std::vector<FoundDisk>& disks);
+
 // What a survey of the film's first frame has shown (survey.hpp).
 struct BeadsSeen {
   Polarity polarity = Polarity::automatic;

@@ -44,14 +44,6 @@ constexpr double company_reach = 2.8, nearest_company = 1.75;
 constexpr std::size_t fewest_company = 3, share_of_company = 2;
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
-Circle place_of(const FoundDisk& disk) {
-  Circle circle;
-  circle.x = disk.x_px;
-  circle.y = disk.y_px;
-  circle.radius = disk.radius_px;
-  return circle;
-}
-
 // What a face is by its rim, or by that of its neighbours where it has none: blur, or a neighbour, hides the rims of
 // small beads. Faces that tile something else have one another for neighbours.
 enum class Standing { has_rim, among_beads, doubled_among_beads, alone };
@@ -95,8 +87,7 @@ void drop_lonely_doubtful(FindResult& found, double radius) {
 
 // Takes out faces without a rim, and gives the others their probability.
 void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& found) {
-  std::vector<Circle> places;
-  for (const FoundDisk& disk : found.disks) places.push_back(place_of(disk));
+  const std::vector<Circle> places = circles_of(found.disks);
   const std::vector<Circle> circles = rims_at(frame, rims, places);
   const std::vector<Standing> standing = standing_of(places, circles);
   std::vector<FoundDisk> kept;
@@ -152,10 +143,9 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   }
   agreement.missed = sure > 0 ? missed / sure : 1;
   std::vector<Circle> places;
-  for (const FoundDisk& disk : faces.disks) {
-    agreement.all.push_back(place_of(disk));
-    if (!disk.cut) places.push_back(place_of(disk));
-  }
+  agreement.all = circles_of(faces.disks);
+  for (std::size_t k = 0; k < faces.disks.size(); ++k)
+    if (!faces.disks[k].cut) places.push_back(agreement.all[k]);
   const std::vector<Circle> circles = rims_at(frame, rims.model, places);
   const std::vector<Standing> standing = standing_of(places, circles);
   std::vector<Circle> seen_rims;  // of the faces
@@ -270,11 +260,10 @@ std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*
     find.radius_px = start;
     PackedBed bed = learn_packed_bed(frames, find);
     if (!bed.faces.found) continue;
-    std::vector<Circle> found;
-    for (const FoundDisk& disk : bed.disks) found.push_back(place_of(disk));
     FinderCalibration& calibration = bed.faces.calibration;
     calibration.rims = rims_of(calibration);
-    calibration.expected_missed = share_missed(*frames.back(), *calibration.rims, found, 0, options.roi);
+    calibration.expected_missed =
+        share_missed(*frames.back(), *calibration.rims, circles_of(bed.disks), 0, options.roi);
     bed.faces.in_last_frame.emplace().disks = std::move(bed.disks);
     return std::move(bed.faces);
   }

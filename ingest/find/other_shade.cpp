@@ -43,15 +43,6 @@ double margin_of(const FinderCalibration& finder) {
   return finder.by_rims ? shade_margin_px + margin_radii * finder.radius_px : shade_margin_edges * finder.edge_width_px;
 }
 
-std::vector<Circle> circles_of(const std::vector<FoundDisk>& disks) {
-  std::vector<Circle> circles;
-  for (const FoundDisk& disk : disks) {
-    circles.emplace_back();
-    circles.back().x = disk.x_px, circles.back().y = disk.y_px, circles.back().radius = disk.radius_px;
-  }
-  return circles;
-}
-
 // Of the beads found in the painted frame, those that are beads of the frame.
 void keep_own(const GrayFrame& painted, const FinderCalibration& other, const std::vector<FoundDisk>& found,
               FindResult& more) {

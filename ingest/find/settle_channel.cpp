@@ -94,13 +94,7 @@ bool better_there(const Trial& here, const Trial& there) {
 }
 
 double apart_of(const std::vector<FoundDisk>& disks, double radius_px) {
-  std::vector<Circle> circles;
-  for (const FoundDisk& disk : disks) {
-    Circle circle;
-    circle.x = disk.x_px, circle.y = disk.y_px, circle.radius = disk.radius_px;
-    circles.push_back(circle);
-  }
-  const auto touching = touching_radius(circles);
+  const auto touching = touching_radius(circles_of(disks));
   const double apart = touching.value_or(radius_px) / radius_px;
   return apart > nearest_apart && apart < farthest_apart ? apart : 1;
 }
@@ -384,7 +378,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   const bool plain = most.plain();
   for (OtherChannel& other : others_worth_a_trial(frames, best, options, plain)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
-    const double wanted = clearly_more * most.expected, missing = wanted - most.expected;
+    const double missing = (clearly_more - 1) * most.expected;
     if (plain && trials.rims_beside(most.disks, *other.frame, options.polarity, missing) <= missing) continue;
     if (plain && options.polarity == Polarity::automatic)
       other.polarity = trials.polarity_of_radius(*other.frame, other.polarity, most.radius_px);

@@ -305,12 +305,8 @@ class FilmLearner {
     FinderCalibration& first = calibrated_.calibration;
     first.rims = rims_of(first);
     const BothKinds both = find_both_kinds(straight_.back(), film_, find_);
-    std::vector<Circle> circles;
-    for (const FindResult* found : {&both.first, &both.second})
-      for (const FoundDisk& disk : found->disks) {
-        circles.emplace_back();
-        circles.back().x = disk.x_px, circles.back().y = disk.y_px, circles.back().radius = disk.radius_px;
-      }
+    std::vector<Circle> circles = circles_of(both.first.disks);
+    for (const Circle& circle : circles_of(both.second.disks)) circles.push_back(circle);
     first.expected_missed =
         share_of_missed(expected_missed_beads(straight_.back(), *first.rims, circles, find_.roi), circles.size());
   }

@@ -337,7 +337,7 @@ TEST(FigureByHand, HasPublishedFitAndPoints) {
   EXPECT_THAT(read_text(figure.output("profile.gp")),
               HasSubstr("set title 'a\\_b'\nset xrange [0:35]\nset yrange [0:*]\n"));
   EXPECT_THAT(read_text(figure.output("profile.gp")), HasSubstr("lc rgb '#009E73' title 'mine.csv'"));
-  // At least two diameters of what is above the shift of the published fit, 4.41/1.10 diameters, are shown.
+  // The axis reaches two diameters above the shift of the published fit, 4.41/1.10 diameters, and half a diameter more.
   write_text(figure.file("profile.csv"), "height,number_density,std_error\n0,1,0.01\n1,0.5,0.02\n");
   figure.run(R"({ "reference": "clement-rajchenbach-1991" })");
   EXPECT_THAT(read_text(figure.output("profile.gp")), HasSubstr("set xrange [0:7]\n"));
