@@ -125,7 +125,8 @@ struct CalibrationResult {
   bool found = false;
   FinderCalibration calibration;
   std::string why_not;
-  std::shared_ptr<LearnedBeads> beads;      // for tell_radius()
+  std::shared_ptr<LearnedBeads> beads;  // for tell_radius()
+  bool packed = false;  // a model of disks that touch describes the last frame: nothing among them is anything else
   std::optional<FindResult> in_last_frame;  // by learn_beads(), as far as it looked
 };
 CalibrationResult calibrate_finder(const std::vector<const GrayFrame*>& frames, const FindOptions& options = {});

@@ -42,6 +42,8 @@ constexpr double beyond_region = 4;
 // many times those without. Two that are nearer than this may be faces of one bead.
 constexpr double company_reach = 2.8, nearest_company = 1.75;
 constexpr std::size_t fewest_company = 3, share_of_company = 2;
+// Of a radius: what nearest neighbours leave free where only the bright part of spheres that touch was found.
+constexpr double least_room = 1.05, most_room = 1.3;
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
 // What a face is by its rim, or by that of its neighbours where it has none: blur, or a neighbour, hides the rims of
@@ -184,13 +186,19 @@ class FacesAndRims {
   FacesAndRims(const std::vector<const GrayFrame*>& frames, const FindOptions& asked, const LearnedRims& rims)
       : frames_(frames), asked_(asked), rims_(rims) {}
 
+  // Faces that are larger than the rims, if learn() found such and nothing else.
+  std::optional<CalibrationResult> larger() { return std::exchange(larger_, std::nullopt); }
+
   // The calibration by faces, if faces and rims agree.
   std::optional<CalibrationResult> learn() {
     CalibrationResult faces = learn_finder(frames_, asked_);
     for (int round = 0;; ++round) {
       faces.calibration.left_out = left_out_;
       const double ratio = faces.found ? faces.calibration.radius_px / rims_.model.radius_px : 0;
-      if (!(ratio > least_ratio && ratio < most_ratio)) return std::nullopt;
+      if (!(ratio > least_ratio && ratio < most_ratio)) {
+        if (ratio >= most_ratio && !left_out_) larger_ = std::move(faces);
+        return std::nullopt;
+      }
       const GrayFrame& frame = *frames_.back();
       const FindResult found = find_disks(frame, faces.calibration, asked_);
       const Agreement agreement = compare(frame, rims_, found);
@@ -244,30 +252,50 @@ class FacesAndRims {
   const FindOptions& asked_;
   const LearnedRims& rims_;
   std::shared_ptr<const std::vector<std::uint8_t>> left_out_;
+  std::optional<CalibrationResult> larger_;
 };
 
-// Beads that lie close and whose rims mislead, by their faces. The radius is the one that is given or was seen, or, of
-// circles that are too small, half the distance between their centres.
+// Beads that lie close and whose rims mislead, by their faces.
+std::optional<CalibrationResult> described(PackedBed bed, const GrayFrame& frame, const FindOptions& options) {
+  if (!bed.faces.found) return std::nullopt;
+  FinderCalibration& calibration = bed.faces.calibration;
+  calibration.rims = rims_of(calibration);
+  calibration.expected_missed = share_missed(frame, *calibration.rims, circles_of(bed.disks), 0, options.roi);
+  bed.faces.in_last_frame.emplace().disks = std::move(bed.disks);
+  bed.faces.packed = true;
+  return std::move(bed.faces);
+}
+
+// The same, learned from each of these radii in turn.
 std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
-                                              const LearnedRims& rims) {
-  std::vector<Circle> circles;
-  for (const RimDisk& disk : rims.disks) circles.push_back(disk.circle);
-  std::vector<double> starts = {options.radius_px.value_or(options.seen->radius_px)};
-  if (const auto touching = touching_radius(circles); touching && !options.radius_px) starts.push_back(*touching);
-  for (const double start : starts) {
-    FindOptions find = options;
-    find.polarity = options.seen->polarity;
-    find.radius_px = start;
-    PackedBed bed = learn_packed_bed(frames, find);
-    if (!bed.faces.found) continue;
-    FinderCalibration& calibration = bed.faces.calibration;
-    calibration.rims = rims_of(calibration);
-    calibration.expected_missed =
-        share_missed(*frames.back(), *calibration.rims, circles_of(bed.disks), 0, options.roi);
-    bed.faces.in_last_frame.emplace().disks = std::move(bed.disks);
-    return std::move(bed.faces);
+                                              const std::vector<double>& radii_px) {
+  FindOptions find = options;
+  find.polarity = options.seen->polarity;
+  for (const double radius : radii_px) {
+    find.radius_px = radius;
+    if (auto packed = described(learn_packed_bed(frames, find), *frames.back(), options)) return packed;
   }
   return std::nullopt;
+}
+
+// The radius that is given or was seen, and, of circles that are too small, half the distance between their centres.
+std::vector<double> packed_radii(const FindOptions& options, const LearnedRims& rims) {
+  std::vector<Circle> circles;
+  for (const RimDisk& disk : rims.disks) circles.push_back(disk.circle);
+  std::vector<double> radii = {options.radius_px.value_or(options.seen->radius_px)};
+  if (const auto touching = touching_radius(circles); touching && !options.radius_px) radii.push_back(*touching);
+  return radii;
+}
+
+// Disks that agree with the rims and leave room between nearest neighbours, all the same room, may be the bright part
+// of shaded spheres that touch: these describe the frame as well, then.
+std::optional<CalibrationResult> learn_touching(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                                                const CalibrationResult& faces) {
+  if (options.radius_px || !faces.in_last_frame) return std::nullopt;
+  const auto touching = touching_radius(circles_of(faces.in_last_frame->disks));
+  const double room = touching.value_or(0) / faces.calibration.radius_px;
+  if (room < least_room || room > most_room) return std::nullopt;
+  return learn_packed(frames, options, {*touching});
 }
 
 // Circles that were not counted; what both searches found once.
@@ -438,8 +466,15 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   const GapModel& gaps = *rims.model.gaps;
   const bool of_one_size = gaps.other_sizes.empty() && gaps.not_round.empty();
   if (!options.seen->no_faces) {
-    if (auto faces = of_one_size ? FacesAndRims(frames, asked, rims).learn() : std::nullopt) return std::move(*faces);
-    if (auto packed = learn_packed(frames, options, rims)) return std::move(*packed);
+    FacesAndRims faces_and_rims(frames, asked, rims);
+    if (auto faces = of_one_size ? faces_and_rims.learn() : std::nullopt) {
+      auto touching = learn_touching(frames, options, *faces);
+      return std::move(touching ? *touching : *faces);
+    }
+    if (auto larger = faces_and_rims.larger())
+      if (auto packed = described(packed_bed_of(std::move(*larger), frames, asked), frame, options))
+        return std::move(*packed);
+    if (auto packed = learn_packed(frames, options, packed_radii(options, rims))) return std::move(*packed);
   }
   if (!options.quick_rims) rims = most_telling(frame, std::move(rims), options);
   return calibration_by_rims(frame, rims, options);

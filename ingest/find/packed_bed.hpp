@@ -22,7 +22,10 @@ struct Packing {
   double overlapping = 0;  // share of the disks with a neighbour much nearer than that
   double unexplained = 0;  // share of the pixels on and beside the disks where the model is plainly off
   double misfit = 0;       // rms of these pixels' residuals over that of the noise alone
-  double filled = 0;       // share of the frame
+  double filled = 0;       // share of the upright rectangle round the disks, as far as it is seen
+  bool lit = false;        // the model of a disk is brighter on one side
+  // Disks that touch, and what is beside them; and these lie close.
+  [[nodiscard]] bool describes() const;
   [[nodiscard]] bool convinces() const;
 };
 
@@ -30,10 +33,17 @@ struct Packing {
 Packing packing_of(const GrayFrame& frame, const FindResult& found, const FinderCalibration& faces);
 
 struct PackedBed {
-  CalibrationResult faces;  // with its radius (tell_radius); found only if the packing convinces
+  CalibrationResult faces;  // with its radius (tell_radius); found only if the packing describes the bed
   Packing packing;
   std::vector<FoundDisk> disks;  // of the last frame
+  // Where larger beads were looked for in a reduced frame: this frame, whose px all lengths are, and its reduction.
+  GrayFrame reduced_frame{};
+  int reduction = 1;
 };
+
+// Whether faces learned from these frames are those of disks that touch. `faces`: from learn_finder(), found.
+PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFrame*>& frames,
+                        const FindOptions& options);
 
 // From the radius in `options`, or with nothing to start from.
 PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options);
@@ -52,8 +62,11 @@ inline constexpr double largest_packed_px = 14;
 struct PackedStart {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;
+  // Circles are seen of which one side is missing: beads of any size, worth a look at all of the picture.
+  bool lit = false;
 };
-// The first start that leads to small beads. Of a large picture a part must convince before all of it is looked at.
+// The first start that leads to small beads, or to lit ones. Of a large picture a part must convince before all of it
+// is looked at. Where beads are lit all of it is looked at: a part may show no ground, whose level is then not known.
 std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::vector<PackedStart>& starts);
 
 }  // namespace shakebed::ingest

@@ -150,6 +150,11 @@ double contrast_of(const GrayFrame& frame, const std::vector<RimDisk>& disks, do
   return median_of(std::move(contrasts));
 }
 
+// Whether a run reduces such frames.
+bool large(const ChannelFrames& frames) {
+  return static_cast<double>(frames.width) * frames.height > large_frame_pixels;
+}
+
 class ChannelTrials {
  public:
   // `side_px`: of the part of a frame that trials look at.
@@ -181,14 +186,16 @@ class ChannelTrials {
     // Of a single channel it is only asked whether its faces are alike.
     const Shades shades = frames_.channels.size() > 1 ? Shades::where_doubtful : Shades::common;
     if (!options.search || !searches_all(picture, options)) return trial_in(picture, best_.rims.polarity, shades);
+    GrayFrame all = factor_ > 1 ? reduced(picture, factor_) : picture;
     FindOptions asked = asked_of_run(best_.rims.polarity, options);
     FindOptions find = asked;
     find.rims_of_one_size = true;  // which faces do not depend on
-    CalibrationResult learned = learn_beads({&picture}, find);
-    Trial trial = tried(picture, find, learned, shades);
+    CalibrationResult learned = learn_beads({&all}, find);
+    Trial trial = tried(all, find, learned, shades);
     keep_to_part(trial);
-    if (learned.found && !learned.calibration.by_rims)
-      trial.searched = std::make_shared<SearchedFrame>(picture, frames_.reduction, asked, std::move(learned));
+    if (learned.found && !learned.calibration.by_rims && (factor_ == 1 || large(frames_)))
+      trial.searched =
+          std::make_shared<SearchedFrame>(std::move(all), frames_.reduction * factor_, asked, std::move(learned));
     return trial;
   }
 
@@ -276,7 +283,9 @@ class ChannelTrials {
   // Whether beads will be searched in frames like this one, as the trial would search its part. In a frame that is
   // larger than the part this is worth its time if they are expected to be found by their faces.
   [[nodiscard]] bool searches_all(const GrayFrame& picture, const SurveyOptions& options) const {
-    if (factor_ > 1 || options.roi || best_.region || picture.enlargement > 1) return false;
+    if (options.roi || best_.region || picture.enlargement > 1) return false;
+    if (best_.packed) return true;  // a part may show no ground, without which faces cannot be told from it
+    if (factor_ > 1) return false;
     if (frames_.reduction > 1 && radius_px() < trial_radius_px) return false;
     const bool plain = best_.disks.size() >= many && best_.explained_share >= most_of_the_edges &&
                        best_.expected_wrong <= almost_none_wrong;
@@ -369,8 +378,8 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   const ChannelTrials trials(frames, best, options, options.channel_alone ? glance_side_px : trial_side_px);
   const auto first = std::find_if(frames.channels.begin(), frames.channels.end(),
                                   [&](const ChannelFrames::One& one) { return one.channel == best.channel; });
-  const bool large = !options.channel_alone && static_cast<double>(frames.width) * frames.height > large_frame_pixels;
-  if ((frames.channels.size() < 2 && !large) || first == frames.channels.end()) return best;
+  const bool worth_it = !options.channel_alone && large(frames);
+  if ((frames.channels.size() < 2 && !worth_it) || first == frames.channels.end()) return best;
   Trial most = trials.first_trial(first->frame, options);
   SurveyCandidate settled = best;
   settled.by_rims = most.by_rims;
@@ -390,7 +399,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
     settled.searched.reset();
     most = std::move(there);
   }
-  if (large && settled.by_rims && !options.roi) trials.try_faces_in_all(settled, options);
+  if (worth_it && settled.by_rims && !options.roi) trials.try_faces_in_all(settled, options);
   return settled;
 }
 

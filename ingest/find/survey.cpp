@@ -56,6 +56,8 @@ constexpr double outline_tells_px = 2 * wide_enough_px;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
 // Half as much is added where the radius is given: then something of this size is known to be there.
 constexpr double least_mean_support = 0.42, support_for_few = 3.5, most_asked = 0.9;
+// Of the circles: so many disks are as many.
+constexpr double as_many = 0.98;
 constexpr double most_of_few = 100;      // circles: of more, support_for_few asks for 4 % more at most
 constexpr double least_open_rim = 0.35;  // share of the rim that others leave free, at least
 
@@ -297,6 +299,18 @@ bool leaves_room(const SurveyCandidate& candidate, int reduction) {
   return touching && *touching > room * candidate.rims.open_radius_px && *touching <= largest_packed_px * reduction;
 }
 
+// Radii at which circles would touch of which one side is missing: spheres lit from the other, whose dark side no
+// circle shows. Their faces tell whether they are beads.
+std::vector<PackedStart> lit_starts(const Survey& survey, Channel channel, int reduction) {
+  std::vector<PackedStart> starts;
+  for (const SurveyCandidate& candidate : survey.candidates) {
+    if (!candidate.plausible || candidate.why_not != one_side_missing || candidate.channel != channel) continue;
+    if (const auto radius = touching_radius(circles_of(candidate.disks)))
+      starts.push_back({candidate.rims.polarity, *radius / reduction, true});
+  }
+  return starts;
+}
+
 // Radii at which the circles of the census would touch, those of the best hypotheses first.
 std::vector<PackedStart> starts_from(const CircleCensus& census, const SurveyOptions& options, int reduction) {
   constexpr std::size_t most_starts = 2;
@@ -322,23 +336,33 @@ struct SurveyedPicture {
   const DrawingSigns& signs;
 };
 
-// Beads that lie close, by their faces, come first where they explain more than circles do.
+// Beads that lie close, by their faces, come first where they explain more than circles do, or are as many: of circles
+// that leave room and beads that touch, only these describe the picture.
 void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const CircleCensus& census,
                          const SurveyOptions& options) {
   std::vector<PackedStart> starts = starts_from(census, options, picture.reduction);
+  if (!survey.found && !options.radius_px) {
+    const std::vector<PackedStart> lit = lit_starts(survey, picture.channel, picture.reduction);
+    starts.insert(starts.begin(), lit.begin(), lit.end());
+  }
   if (!survey.found && !options.radius_px) starts.push_back({options.polarity, std::nullopt});
   const std::optional<PackedBed> bed = look_for_packed_bed(picture.frame, starts);
   if (!bed) return;
-  SurveyCandidate candidate = candidate_of(*bed, picture.frame);
+  SurveyCandidate candidate = candidate_of(*bed, bed->reduction > 1 ? bed->reduced_frame : picture.frame);
   candidate.channel = picture.channel;
   if (const char* why = why_drawn(picture.signs, candidate.explained_share)) candidate.why_drawn = why;
-  enlarge(candidate, picture.reduction);
-  candidate.gain_px *= picture.reduction;
+  const int reduction = picture.reduction * bed->reduction;
+  enlarge(candidate, reduction);
+  candidate.gain_px *= reduction;
   const bool given = !options.radius_px || is_the_given_one(candidate.rims.radius_px, *options.radius_px);
-  candidate.plausible = true;
-  candidate.credible = given && (candidate.why_drawn.empty() || options.any_shape);
+  candidate.plausible = candidate.packed = true;
+  candidate.credible =
+      given && candidate.explained_share >= least_explained && (candidate.why_drawn.empty() || options.any_shape);
   if (!candidate.credible) return;
-  if (survey.found && survey.candidates.front().gain_px > candidate.gain_px) return;
+  if (survey.found && survey.candidates.front().gain_px > candidate.gain_px &&
+      static_cast<double>(candidate.disks.size()) <
+          as_many * static_cast<double>(survey.candidates.front().disks.size()))
+    return;
   survey.candidates.insert(survey.candidates.begin(), std::move(candidate));
   survey.found = true;
 }

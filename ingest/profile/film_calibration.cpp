@@ -180,7 +180,8 @@ class FilmLearner {
   // round and those in the rest are not, the beads are looked for in that part alone.
   void keep_to_round_side() {
     const FinderCalibration& calibration = calibrated_.calibration;
-    if (find_.roi || find_.any_shape || !calibration.rims || calibration.rims->radius_px <= coarse_px) return;
+    if (find_.roi || find_.any_shape || calibrated_.packed) return;
+    if (!calibration.rims || calibration.rims->radius_px <= coarse_px) return;
     const GrayFrame& frame = straight_.back();
     const FindResult found =
         calibrated_.in_last_frame ? *calibrated_.in_last_frame : find_beads(frame, calibration, find_);

@@ -213,6 +213,8 @@ TEST(FinderParts, PackingConvincesWithinItsLimits) {
   EXPECT_FALSE(convinces([](Packing& p) { p.overlapping = 0.021; }));
   EXPECT_FALSE(convinces([](Packing& p) { p.unexplained = 0.0031; }));
   EXPECT_FALSE(convinces([](Packing& p) { p.misfit = 1.21; }));
+  EXPECT_TRUE(convinces([](Packing& p) { p.misfit = 2, p.lit = true; }));
+  EXPECT_FALSE(convinces([](Packing& p) { p.misfit = 2.01, p.lit = true; }));
   EXPECT_FALSE(convinces([](Packing& p) { p.filled = 0.19; }));
 }
 
@@ -228,7 +230,15 @@ TEST(FinderParts, PackingIsThatOfItsDisks) {
   EXPECT_EQ(packing.disks, 25U);
   EXPECT_EQ(packing.touching, 1);
   EXPECT_EQ(packing.overlapping, 0);
-  EXPECT_NEAR(packing.filled, 25 * std::numbers::pi * faces.radius_px * faces.radius_px / (120.0 * 120), 1e-6);
+  // The rectangle round the disks, counted in whole pixels.
+  std::vector<double> across, down;
+  for (const FoundDisk& disk : found.disks) across.push_back(disk.x_px), down.push_back(disk.y_px);
+  const double radius = faces.radius_px;
+  const auto pixels = [&](const std::vector<double>& places) {
+    const auto [first, last] = std::minmax_element(places.begin(), places.end());
+    return std::floor(*last + radius) - std::ceil(*first - radius) + 1;
+  };
+  EXPECT_NEAR(packing.filled, 25 * std::numbers::pi * radius * radius / (pixels(across) * pixels(down)), 1e-6);
   EXPECT_LT(packing.unexplained, 0.003);
   EXPECT_NEAR(packing.misfit, 1, 0.2);
   const double diameter = 2 * faces.radius_px;

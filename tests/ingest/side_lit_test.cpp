@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "ingest/find/learn_beads.hpp"
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/profile/bed_geometry.hpp"
 #include "ingest/profile/film_calibration.hpp"
@@ -122,6 +123,44 @@ TEST(SideLitSpheres, WithASoftRimAreMeasuredByTheirContacts) { expect_measured({
 // The third, whose light comes from below, may be refused.
 TEST(SideLitSpheres, OfOtherLooksAreMeasuredOrRefused) {
   expect_measured({{8, 0.35, 0.5, 40, 38}, {12, 0.25, 0.4, 40, 40}, {7, 0.6, 0.5, 52, 50}}, 2);
+}
+
+// A layer of rows, nearest centres `pitch` D apart, each bead at most 0.003 D from its place.
+sim::Snapshot layer_of(int rows, double pitch, std::uint64_t seed) {
+  RandomStream random(seed);
+  sim::Snapshot bed;
+  for (int row = 0; row < rows; ++row)
+    for (int k = 0; k + 3 < width; ++k) {
+      bed.x.push_back(1 + pitch * (k + 0.5 * (row % 2)) + 0.006 * (random.uniform() - 0.5));
+      bed.z.push_back(0.5 + pitch * row * std::sqrt(0.75) + 0.006 * (random.uniform() - 0.5));
+    }
+  return bed;
+}
+
+// The dark limb shifts circles through the rims inwards, by a tenth here, and hides one side of them. Faces of disks
+// that touch describe the picture all the same, and have the right radius.
+TEST(SideLitSpheres, OfALayerAreBelievedByTheirFaces) {
+  const Look look{14, 0.353, 0.7, 60, 40};
+  const sim::Snapshot bed = layer_of(9, 1, 3);
+  const GrayFrame frame = drawn(bed, look, 8);
+  const BedFound found =
+      measure_bed({{frame.width, frame.height, frame.pixels.data(), PixelType::f32}}, {.bead_diameter_m = 3e-3});
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.measurement.disk_total, bed.x.size());
+  EXPECT_NEAR(3e-3 / found.measurement.calibration.scale_m_per_px / (2 * look.radius_px), 1, 0.01);
+}
+
+TEST(SideLitSpheres, ThatTouchGiveWayToNoCircleInThem) {
+  const Look look{12.5, 0.353, 1.01, 70, 40};
+  const sim::Snapshot bed = layer_of(9, 1.03, 3);
+  const GrayFrame frame = drawn(bed, look, 8);
+  FindOptions find;
+  find.seen = BeadsSeen{Polarity::bright_beads, 0.88 * look.radius_px};
+  const CalibrationResult learned = learn_beads({&frame}, find);
+  ASSERT_TRUE(learned.found && learned.in_last_frame) << learned.why_not;
+  EXPECT_TRUE(learned.packed);
+  EXPECT_EQ(learned.in_last_frame->disks.size(), bed.x.size());
+  EXPECT_NEAR(learned.calibration.radius_px / look.radius_px, 1, 0.01);
 }
 
 // Under a low lamp chance could make up too many of the circles. Where their radius is given it is enough that they
