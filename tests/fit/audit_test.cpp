@@ -41,6 +41,12 @@ TEST(Audit, RecomputesThePaper) {
   EXPECT_NEAR(row("k = 2 Lambda_1 phi_0/mu_0^2 - 1").recomputed, 0.0405375006220, 1e-12);
 }
 
+// The number is that of physics.md, rounded to six digits.
+TEST(Audit, NamesTheThicknessOfEveryEquation) {
+  const std::string text = row("condensation for any pressure").recomputed_text;
+  EXPECT_NE(text.find(": mu_0 = 111.311; "), std::string::npos) << text;
+}
+
 TEST(Audit, EveryRowSpeaks) {
   const auto rows = audit();
   EXPECT_GE(rows.size(), 16U);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 #include "tests/bench/cases/fit_benchmark.hpp"
 #include "tests/fit/synthetic.hpp"
@@ -22,6 +23,18 @@ EmpiricalMap make_map(double noise) {
     }
   }
   return EmpiricalMap({{"gamma", true}, {"restitution", false}}, std::move(points));
+}
+
+TEST(EmpiricalMap, SaysWhyItIsNone) {
+  const auto expect = [](const EmpiricalMap& map, FitStatus status, const std::string& message) {
+    EXPECT_EQ(map.status(), status) << message;
+    EXPECT_EQ(map.message(), message);
+  };
+  expect({{}, {}}, FitStatus::bad_input, "a map needs at least one axis");
+  expect({{{"gamma", true}}, {{{2}, 0.1, 0.01}, {{0}, 0.1, 0.01}, {{3}, 0.1, 0.01}}}, FitStatus::bad_input,
+         "a point of the map is not finite, not positive or has the wrong number of coordinates");
+  expect({{{"gamma", true}}, {{{2}, 0.1, 0.01}, {{3}, 0.1, 0.01}}}, FitStatus::too_few_bins,
+         "the map has 2 points; a fit of 1 axes needs at least 3");
 }
 
 TEST(EmpiricalMap, InterpolatesWithinItsStatedError) {

@@ -54,6 +54,9 @@ TEST(ProfileFile, KnowsEverySpellingOfItsColumns) {
   EXPECT_EQ(both.number_density[0], 0.8);
   EXPECT_EQ(both.area_fraction[0], 0.6) << "as it is written, where both are";
   EXPECT_DOUBLE_EQ(both.area_fraction[1], 0.8 * quarter_pi);
+  const ProfileTable gap = read("z,phi,samples\n1,0.8,7\n2,0.4,\n");
+  EXPECT_EQ(gap.samples[0], 7);
+  EXPECT_EQ(gap.samples[1], 0) << "of an empty cell";
 }
 
 TEST(ProfileFile, KnowsEverySeparator) {

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "sim/engine/plate_spin.hpp"
 #include "sim/engine/simulation.hpp"
@@ -188,6 +190,36 @@ TEST(Plates, SlowDownSlidingAndSpinningTogether) {
     EXPECT_NEAR(disk->energy().imbalance(), 0, 1e-12);
   }
   EXPECT_GT(exact.way.vx, 1 - a * time) << "a disk that spins slides farther";
+}
+
+// Disks that do not meet slide and spin as each does alone, between the ends of intervals, too.
+TEST(Plates, BrakeEachDiskAsIfItWereAlone) {
+  const RubbingPlates plates{0.31, 0.2, true, 0.3};
+  const std::vector<Placed> disks = {
+      {5, 10, 0.4, 0.1, 2.5, 0}, {20, 20, -0.9, 0.5, -1.2, 0}, {35, 30, 0.1, -0.7, 0.6, 0}};
+  Scene scene = spinning_disk(0, 0, 0.4, plates);
+  scene.disks.species = {{3, 1, 1}};
+  scene.start = PlacedStart{disks};
+  const auto all = simulate(scene);
+  std::vector<std::unique_ptr<Simulation>> alone;
+  for (const Placed& disk : disks) {
+    Scene one = spinning_disk(0, 0, 0.4, plates);
+    one.start = PlacedStart{{disk}};
+    alone.push_back(simulate(one));
+  }
+  for (const double time : {0.07, 0.33, 0.5}) {
+    all->advance_to(time);
+    const Snapshot together = snapshot_of(*all);
+    for (std::size_t i = 0; i < disks.size(); ++i) {
+      alone[i]->advance_to(time);
+      const Snapshot its = snapshot_of(*alone[i]);
+      EXPECT_NEAR(together.x[i], its.x[0], 1e-12);
+      EXPECT_NEAR(together.z[i], its.z[0], 1e-12);
+      EXPECT_NEAR(together.vx[i], its.vx[0], 1e-12);
+      EXPECT_NEAR(together.vz[i], its.vz[0], 1e-12);
+      EXPECT_NEAR(together.spin[i], its.spin[0], 1e-12);
+    }
+  }
 }
 
 TEST(Plates, LeaveTheSpinAloneWithoutAContactRadius) {
