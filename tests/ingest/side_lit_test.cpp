@@ -140,8 +140,8 @@ sim::Snapshot layer_of(int rows, double pitch, std::uint64_t seed) {
 // The dark limb shifts circles through the rims inwards, by a tenth here, and hides one side of them. Faces of disks
 // that touch describe the picture all the same, and have the right radius.
 TEST(SideLitSpheres, OfALayerAreBelievedByTheirFaces) {
-  const Look look{14, 0.353, 0.7, 60, 40};
-  const sim::Snapshot bed = layer_of(9, 1, 3);
+  const Look look{20, 0.353, 0.7, 73, 40};
+  const sim::Snapshot bed = layer_of(7, 1, 3);
   const GrayFrame frame = drawn(bed, look, 8);
   const BedFound found =
       measure_bed({{frame.width, frame.height, frame.pixels.data(), PixelType::f32}}, {.bead_diameter_m = 3e-3});
