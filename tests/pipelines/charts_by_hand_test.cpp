@@ -354,6 +354,9 @@ TEST(FigureByHand, EndsWhereTheProfileDoes) {
              "height,number_density,std_error\n0,1,0.01\n7.6,0.0021,0.02\n30,0.0019,0.01\n");
   figure.run("{}");
   EXPECT_THAT(read_text(figure.output("profile.gp")), HasSubstr("set xrange [0:9]\n"));  // 7.6 + 0.5, rounded up
+  write_text(figure.file("profile.csv"), "height,number_density,std_error\n0,1,0.01\n0.3,0.5,0.02\n30,0.0019,0.01\n");
+  figure.run("{}");
+  EXPECT_THAT(read_text(figure.output("profile.gp")), HasSubstr("set xrange [0:1]\n")) << "of a thin bed, too";
 }
 
 // Temperatures against windows: those above 0 alone, and the one that was used as a line from the first to the last.

@@ -379,6 +379,10 @@ TEST(ProposalsForAPicture, GiveTheRegionOfTheBeads) {
   bed.add(200, 30, 0.4);
   bed.look.width = 900;  // so it is said
   bed.add(800, 30, 1);
+  // In the list the outermost on the left follows the one that lies far off.
+  std::vector<ingest::RimDisk>& disks = bed.look.survey.candidates[0].disks;
+  std::sort(disks.begin(), disks.end(), [](const auto& a, const auto& b) { return a.circle.x < b.circle.x; });
+  std::rotate(disks.begin(), disks.end() - 1, disks.end());
   double left = 1e9, top = 1e9, right = 0, bottom = 0;
   for (const Place& place : bed.places) {
     left = std::min(left, place.x - 25), right = std::max(right, place.x + 25);
