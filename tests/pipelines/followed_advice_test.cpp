@@ -113,23 +113,6 @@ std::string lit_from_one_side() {
   return picture.noise(3).pgm();
 }
 
-std::vector<Place> beads_under_lamp() { return lattice(20, 10, 20, 620, 500, 0.02); }
-// Spheres under a low lamp, whose dark side is a little brighter than what is behind them.
-std::string under_a_low_lamp() {
-  PaintedPicture picture(640, 520, 40);
-  picture.disks(beads_under_lamp(), 20, 73);
-  const double low = std::cos(0.7), high = std::sin(0.7);
-  for (const Place& place : beads_under_lamp())
-    picture.paint(
-        [&](double x, double y) {
-          const double u = (x - place.x) / 20, v = (y - place.y) / 20, square = u * u + v * v;
-          const double light = low * (-0.6 * u - 0.8 * v) + high * std::sqrt(std::max(0.0, 1 - square));
-          return std::clamp(light, 0.0, 1.0) * std::clamp(20.5 - 20 * std::sqrt(square), 0.0, 1.0);
-        },
-        210);
-  return picture.blur(0.9).noise(3).pgm();
-}
-
 std::string nothing() { return PaintedPicture(width, height, 128).noise(3).pgm(); }
 
 // Words as a shell takes them apart, double quotes alone.
@@ -265,13 +248,6 @@ TEST(FollowedAdvice, LeadsToTheBeadsFromEveryRefusal) {
       {"ovals", ovals, {}, "the outlines are not round", 35, 1, 1},
       {"specks", specks, {}, "photograph them at least 24 px wide", 306, 6, 1},
       {"a part of the bead", bright_cores, {"--radius", "10"}, "within 25 % of the given", 67, 1, 1},
-      {"a low lamp",
-       under_a_low_lamp,
-       {},
-       "one side of the rim is missing",
-       static_cast<double>(beads_under_lamp().size()),
-       2,
-       1},
       {"holes", holes, {}, "Hardly any of the 81 disks found touch", 81, 0, 2},
   };
   for (const Refusal& refusal : refusals) expect_followed(refusal);
