@@ -42,8 +42,6 @@ constexpr double beyond_region = 4;
 // many times those without. Two that are nearer than this may be faces of one bead.
 constexpr double company_reach = 2.8, nearest_company = 1.75;
 constexpr std::size_t fewest_company = 3, share_of_company = 2;
-// Of a radius: what nearest neighbours leave free where only the bright part of spheres that touch was found.
-constexpr double least_room = 1.05, most_room = 1.3;
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
 // What a face is by its rim, or by that of its neighbours where it has none: blur, or a neighbour, hides the rims of
@@ -256,7 +254,7 @@ class FacesAndRims {
 };
 
 // Beads that lie close and whose rims mislead, by their faces.
-std::optional<CalibrationResult> described(PackedBed bed, const GrayFrame& frame, const FindOptions& options) {
+std::optional<CalibrationResult> as_packed(PackedBed bed, const GrayFrame& frame, const FindOptions& options) {
   if (!bed.faces.found) return std::nullopt;
   FinderCalibration& calibration = bed.faces.calibration;
   calibration.rims = rims_of(calibration);
@@ -273,29 +271,26 @@ std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*
   find.polarity = options.seen->polarity;
   for (const double radius : radii_px) {
     find.radius_px = radius;
-    if (auto packed = described(learn_packed_bed(frames, find), *frames.back(), options)) return packed;
+    if (auto packed = as_packed(learn_packed_bed(frames, find), *frames.back(), options)) return packed;
   }
   return std::nullopt;
 }
 
 // The radius that is given or was seen, and, of circles that are too small, half the distance between their centres.
 std::vector<double> packed_radii(const FindOptions& options, const LearnedRims& rims) {
-  std::vector<Circle> circles;
-  for (const RimDisk& disk : rims.disks) circles.push_back(disk.circle);
   std::vector<double> radii = {options.radius_px.value_or(options.seen->radius_px)};
-  if (const auto touching = touching_radius(circles); touching && !options.radius_px) radii.push_back(*touching);
+  if (const auto touching = touching_radius(circles_of(rims.disks)); touching && !options.radius_px)
+    radii.push_back(*touching);
   return radii;
 }
 
-// Disks that agree with the rims and leave room between nearest neighbours, all the same room, may be the bright part
-// of shaded spheres that touch: these describe the frame as well, then.
+// Disks that agree with the rims and lie apart, all equally far, may be the bright part of shaded spheres that touch:
+// these describe the frame as well, then.
 std::optional<CalibrationResult> learn_touching(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
                                                 const CalibrationResult& faces) {
   if (options.radius_px || !faces.in_last_frame) return std::nullopt;
-  const auto touching = touching_radius(circles_of(faces.in_last_frame->disks));
-  const double room = touching.value_or(0) / faces.calibration.radius_px;
-  if (room < least_room || room > most_room) return std::nullopt;
-  return learn_packed(frames, options, {*touching});
+  const auto touching = radius_beyond(circles_of(faces.in_last_frame->disks), faces.calibration.radius_px);
+  return touching ? learn_packed(frames, options, {*touching}) : std::nullopt;
 }
 
 // Circles that were not counted; what both searches found once.
@@ -346,7 +341,7 @@ double share_missed_of(const GrayFrame& frame, const RimModel& model, const Rims
                        const std::optional<PixelRectangle>& region) {
   // Where things lie that are no beads, none are missed.
   std::vector<Circle> taken = not_round_of(model, seen);
-  for (const RimDisk& disk : seen.disks) taken.push_back(disk.circle);
+  for (const Circle& circle : circles_of(seen.disks)) taken.push_back(circle);
   return share_of_missed(std::max(seen.expected_missed, expected_missed_beads(frame, model, taken, region)),
                          seen.disks.size());
 }
@@ -472,7 +467,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
       return std::move(touching ? *touching : *faces);
     }
     if (auto larger = faces_and_rims.larger())
-      if (auto packed = described(packed_bed_of(std::move(*larger), frames, asked), frame, options))
+      if (auto packed = as_packed(packed_bed_of(std::move(*larger), frames, asked), frame, options))
         return std::move(*packed);
     if (auto packed = learn_packed(frames, options, packed_radii(options, rims))) return std::move(*packed);
   }

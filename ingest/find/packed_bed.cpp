@@ -7,6 +7,7 @@
 
 #include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/learn_beads.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/frames/smooth_field.hpp"
 
@@ -30,7 +31,8 @@ constexpr double least_filled = 0.2;
 constexpr double most_misfit_of_lit = 2;
 constexpr double smallest_px = 3;  // smaller disks are specks
 constexpr int part_px = 400;
-constexpr double lit_radius_px = 9;  // px: larger beads that are lit from one side are looked for in a reduced frame
+// Radii: half the distance of neighbours that may be parts of disks that touch.
+constexpr double nearest_apart = 1.05, farthest_apart = 1.3;
 // Of largest_packed_px: a first radius is good to some 5 %. A model of larger disks would be learned in vain: of a ball
 // of 100 px it took nine tenths of the time until the picture was refused.
 constexpr double largest_start = 1.25;
@@ -188,11 +190,17 @@ std::optional<double> touching_radius(const std::vector<Circle>& circles) {
   return 0.5 * middle;
 }
 
+std::optional<double> radius_beyond(const std::vector<Circle>& circles, double radius_px) {
+  const auto touching = touching_radius(circles);
+  const double apart = touching.value_or(radius_px) / radius_px;
+  return apart > nearest_apart && apart < farthest_apart ? touching : std::nullopt;
+}
+
 namespace {
 
 // In a frame reduced so far that the beads are small.
 std::optional<PackedBed> look_for_lit_bed(const GrayFrame& frame, const PackedStart& start) {
-  const int reduction = std::max(1, static_cast<int>(*start.radius_px / lit_radius_px));
+  const int reduction = std::max(1, static_cast<int>(*start.radius_px / trial_radius_px));
   FindOptions find;
   find.polarity = start.polarity;
   find.radius_px = *start.radius_px / reduction;

@@ -55,6 +55,10 @@ RimModel rims_of(const FinderCalibration& faces);
 // touch; nothing where the nearest neighbours lie at all distances.
 std::optional<double> touching_radius(const std::vector<Circle>& circles);
 
+// The same, where it is so much more than the radius of the circles that their nearest neighbours do not touch, but may
+// be parts of disks that do. If two neighbours are farther apart, they do not touch, however alike their distances.
+std::optional<double> radius_beyond(const std::vector<Circle>& circles, double radius_px);
+
 // px of the frame: rims of larger disks are seen well.
 inline constexpr double largest_packed_px = 14;
 
@@ -66,7 +70,8 @@ struct PackedStart {
   bool lit = false;
 };
 // The first start that leads to small beads, or to lit ones. Of a large picture a part must convince before all of it
-// is looked at. Where beads are lit all of it is looked at: a part may show no ground, whose level is then not known.
+// is looked at. Where beads are lit all of it is looked at: a part may show no background, whose level is then not
+// known.
 std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::vector<PackedStart>& starts);
 
 }  // namespace shakebed::ingest

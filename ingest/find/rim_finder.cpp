@@ -186,8 +186,7 @@ LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known)
 
 // Rims that are plainly not round are hardly those of beads, unless chance makes so many seem so.
 void doubt_departing(PictureMaps& maps, const RimModel& model, RimsFound& found) {
-  std::vector<Circle> circles;
-  for (const RimDisk& disk : found.disks) circles.push_back(disk.circle);
+  const std::vector<Circle> circles = circles_of(found.disks);
   const std::vector<RimShape> shapes = shapes_of_rims(maps, model, circles, circles);
   std::vector<RimShape> of_one_size;
   for (std::size_t k = 0; k < shapes.size(); ++k)
@@ -211,6 +210,13 @@ void doubt_departing(PictureMaps& maps, const RimModel& model, RimsFound& found)
 }
 
 }  // namespace
+
+std::vector<Circle> circles_of(const std::vector<RimDisk>& disks) {
+  std::vector<Circle> circles;
+  circles.reserve(disks.size());
+  for (const RimDisk& disk : disks) circles.push_back(disk.circle);
+  return circles;
+}
 
 double RimModel::probability_of(double support) const { return probability_at(probability, support); }
 
@@ -248,9 +254,7 @@ void learn_gaps(const GrayFrame& frame, LearnedRims& learned, bool one_size) {
 }
 
 void learn_gaps(PictureMaps& maps, LearnedRims& learned, bool one_size) {
-  std::vector<Circle> beads;
-  for (const RimDisk& disk : learned.disks) beads.push_back(disk.circle);
-  learned.model.gaps = chances_in_gaps(maps, beads, learned.model, one_size);
+  learned.model.gaps = chances_in_gaps(maps, circles_of(learned.disks), learned.model, one_size);
 }
 
 Roundness roundness_of(const GrayFrame& frame, const RimModel& model, const std::vector<RimDisk>& disks) {
@@ -283,8 +287,7 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
     doubt_departing(maps, model, found);
     return found;
   }
-  std::vector<Circle> beads;
-  for (const RimDisk& disk : found.disks) beads.push_back(disk.circle);
+  const std::vector<Circle> beads = circles_of(found.disks);
   const GapCircles more = circles_in_gaps(maps, beads, model);
   found.expected_missed = more.expected_missed;
   for (auto gone = more.displaced.rbegin(); gone != more.displaced.rend(); ++gone)

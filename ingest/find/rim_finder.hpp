@@ -70,6 +70,9 @@ struct RimDisk {
   bool other_size = false;  // its radius is not that of the others
 };
 
+// Their circles alone.
+std::vector<Circle> circles_of(const std::vector<RimDisk>& disks);
+
 struct LearnedRims {
   RimModel model;
   std::vector<RimDisk> disks;  // of the frame learned from

@@ -21,7 +21,7 @@ namespace shakebed::ingest {
 namespace {
 
 // Of the part of a frame that trials look at, to compare channels and to see whether faces are alike. In 400 px a
-// packed bed may hide all ground, and is then found by its rims.
+// packed bed may hide all background, and is then found by its rims.
 constexpr int trial_side_px = 480;
 // Of the part where only the channel is asked for, and where channels are chosen for a trial: a quarter of the time.
 constexpr int glance_side_px = 320;
@@ -43,9 +43,6 @@ constexpr double sure_rim = 0.9, nearest_of_another = 1.6;
 
 // Of a radius: beads that are plainly seen here, and are of another radius there, are not the same.
 constexpr double another_size = 0.12;
-
-// Radii: neighbours that are nearer may touch, and those that are farther apart do not, however alike their distances.
-constexpr double nearest_apart = 1.05, farthest_apart = 1.3;
 
 // Two channels of which one tells this share of the other's variance show the same beads.
 constexpr double the_same = 0.998;
@@ -93,12 +90,6 @@ bool better_there(const Trial& here, const Trial& there) {
   return there.wrong < hardly && std::abs(there.radius_px / here.radius_px - 1) < another_size;
 }
 
-double apart_of(const std::vector<FoundDisk>& disks, double radius_px) {
-  const auto touching = touching_radius(circles_of(disks));
-  const double apart = touching.value_or(radius_px) / radius_px;
-  return apart > nearest_apart && apart < farthest_apart ? apart : 1;
-}
-
 Trial trial_of(const FinderCalibration& learned, const FindResult& found) {
   Trial trial;
   trial.by_rims = learned.by_rims;
@@ -107,7 +98,7 @@ Trial trial_of(const FinderCalibration& learned, const FindResult& found) {
   trial.missed = learned.expected_missed;
   if (!found.disks.empty()) trial.wrong = 1 - trial.expected / static_cast<double>(found.disks.size());
   trial.disks = found.disks;
-  trial.apart = apart_of(trial.disks, trial.radius_px);
+  trial.apart = radius_beyond(circles_of(trial.disks), trial.radius_px).value_or(trial.radius_px) / trial.radius_px;
   return trial;
 }
 
@@ -200,7 +191,7 @@ class ChannelTrials {
   }
 
   // Of a candidate whose beads were found by their rims in the part: whether all of the frame shows faces. In the part
-  // beads may hide all ground.
+  // beads may hide all background.
   void try_faces_in_all(SurveyCandidate& settled, const SurveyOptions& options) const {
     const auto chosen = std::find_if(frames_.channels.begin(), frames_.channels.end(),
                                      [&](const ChannelFrames::One& one) { return one.channel == settled.channel; });
@@ -284,7 +275,7 @@ class ChannelTrials {
   // larger than the part this is worth its time if they are expected to be found by their faces.
   [[nodiscard]] bool searches_all(const GrayFrame& picture, const SurveyOptions& options) const {
     if (options.roi || best_.region || picture.enlargement > 1) return false;
-    if (best_.packed) return true;  // a part may show no ground, without which faces cannot be told from it
+    if (best_.packed) return true;  // a part may show no background, and beads cannot be learned without
     if (factor_ > 1) return false;
     if (frames_.reduction > 1 && radius_px() < trial_radius_px) return false;
     const bool plain = best_.disks.size() >= many && best_.explained_share >= most_of_the_edges &&

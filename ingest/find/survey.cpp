@@ -285,12 +285,6 @@ SurveyCandidate candidate_of(const PackedBed& bed, const GrayFrame& frame) {
   return candidate;
 }
 
-std::vector<Circle> circles_of(const std::vector<RimDisk>& disks) {
-  std::vector<Circle> circles;
-  for (const RimDisk& disk : disks) circles.push_back(disk.circle);
-  return circles;
-}
-
 // Circles that are beads leave no room between nearest neighbours where beads touch. Circles through what blur leaves
 // of rims in a packed bed do, unless the beads that would touch are too large for that.
 bool leaves_room(const SurveyCandidate& candidate, int reduction) {

@@ -137,7 +137,7 @@ sim::Snapshot layer_of(int rows, double pitch, std::uint64_t seed) {
   return bed;
 }
 
-// The dark limb shifts circles through the rims inwards, by a tenth here, and hides one side of them. Faces of disks
+// The dark edge shifts circles through the rims inwards, by a tenth here, and hides one side of them. Faces of disks
 // that touch describe the picture all the same, and have the right radius.
 TEST(SideLitSpheres, OfALayerAreBelievedByTheirFaces) {
   const Look look{20, 0.353, 0.7, 73, 40};

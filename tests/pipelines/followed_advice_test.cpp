@@ -113,6 +113,25 @@ std::string lit_from_one_side() {
   return picture.noise(3).pgm();
 }
 
+// Between the nearest of beads that are believed by their faces, and of those that are not, in diameters.
+constexpr double close = 0.02, far_apart = 0.3;
+std::vector<Place> beads_under_lamp(double gap) { return lattice(20, 10, 20, 620, 500, gap); }
+// Spheres under a lamp so many radians high, whose dark side is a little brighter than the background.
+std::string under_a_low_lamp(double gap, double dark, double lamp) {
+  PaintedPicture picture(640, 520, 40);
+  picture.disks(beads_under_lamp(gap), 20, dark);
+  const double low = std::cos(lamp), high = std::sin(lamp);
+  for (const Place& place : beads_under_lamp(gap))
+    picture.paint(
+        [&](double x, double y) {
+          const double u = (x - place.x) / 20, v = (y - place.y) / 20, square = u * u + v * v;
+          const double light = low * (-0.6 * u - 0.8 * v) + high * std::sqrt(std::max(0.0, 1 - square));
+          return std::clamp(light, 0.0, 1.0) * std::clamp(20.5 - 20 * std::sqrt(square), 0.0, 1.0);
+        },
+        210);
+  return picture.blur(0.9).noise(3).pgm();
+}
+
 std::string nothing() { return PaintedPicture(width, height, 128).noise(3).pgm(); }
 
 // Words as a shell takes them apart, double quotes alone.
@@ -233,6 +252,17 @@ TEST(FollowedAdvice, LeadsToTheBeads) {
   expect_followed({"another polarity", dark_beads, {"--polarity", "bright"}, "no beads", number_of_beads(), 0, 1});
 }
 
+// The nearest of these centres are up to 0.02 diameters farther apart than beads that touch, which they are taken for.
+TEST(FollowedAdvice, IsNotNeededUnderALowLampWhereBeadsTouch) {
+  Runner runner(under_a_low_lamp(close, 73, 0.7));
+  const ProgramResult result = runner.run(runner.arguments({}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(runner.beads(), static_cast<double>(beads_under_lamp(close).size()));
+  const Json scale = read_json(runner.out() / "extract/extract.json")["scale"];
+  EXPECT_EQ(scale["unit"], "m/px");
+  EXPECT_NEAR(3e-3 / scale["value"].get<double>(), 40, 0.02 * 40);
+}
+
 TEST(FollowedAdvice, LeadsToTheBeadsFromEveryRefusal) {
   const double beads = number_of_beads();
   const std::vector<Refusal> refusals{
@@ -248,6 +278,13 @@ TEST(FollowedAdvice, LeadsToTheBeadsFromEveryRefusal) {
       {"ovals", ovals, {}, "the outlines are not round", 35, 1, 1},
       {"specks", specks, {}, "photograph them at least 24 px wide", 306, 6, 1},
       {"a part of the bead", bright_cores, {"--radius", "10"}, "within 25 % of the given", 67, 1, 1},
+      {"a low lamp",
+       [] { return under_a_low_lamp(far_apart, 55, 0.5); },
+       {},
+       "the outlines are open",
+       static_cast<double>(beads_under_lamp(far_apart).size()),
+       2,
+       1},
       {"holes", holes, {}, "Hardly any of the 81 disks found touch", 81, 0, 2},
   };
   for (const Refusal& refusal : refusals) expect_followed(refusal);
