@@ -70,7 +70,8 @@ struct Trial {
   // Radius at which most neighbours would touch, over the radius seen. A channel may show no more of shaded spheres
   // than their bright middle.
   double apart = 1;
-  [[nodiscard]] bool doubtful() const { return wrong > hardly || missed > hardly || apart > 1; }
+  [[nodiscard]] bool complete() const { return wrong <= hardly && missed <= hardly; }
+  [[nodiscard]] bool doubtful() const { return !complete() || apart > 1; }
   [[nodiscard]] bool plain() const { return !by_rims && !doubtful(); }
   // Beads found, each by the share of its radius that is seen.
   [[nodiscard]] double shown() const { return expected / apart; }
@@ -107,6 +108,7 @@ Trial tried(const GrayFrame& frame, const FindOptions& find, const CalibrationRe
   FindResult found = learned.in_last_frame ? *learned.in_last_frame : find_beads(frame, learned.calibration, find);
   Trial trial = trial_of(learned.calibration, found);
   if (shades == Shades::common || (shades == Shades::where_doubtful && trial.plain())) return trial;
+  if (find.quick_rims && trial.by_rims) return trial;  // there are no faces, which were asked for
   FinderCalibration of_both = learned.calibration;
   learn_other_shade(frame, find, of_both, found);
   return trial_of(of_both, found);
@@ -163,11 +165,14 @@ class ChannelTrials {
                           options.roi->width / all, options.roi->height / all};
   }
 
-  [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity, Shades shades) const {
+  // `faces_alone`: rims are searched quickly.
+  [[nodiscard]] Trial trial_in(const GrayFrame& picture, Polarity polarity, Shades shades,
+                               bool faces_alone = false) const {
     FindOptions find;
     find.seen = BeadsSeen{polarity, radius_px()};
     find.roi = roi_;
     find.rims_of_one_size = true;
+    find.quick_rims = faces_alone;
     const GrayFrame part = small(picture);
     return tried(part, find, learn_beads({&part}, find), shades);
   }
@@ -311,55 +316,66 @@ class ChannelTrials {
   std::optional<PixelRectangle> roi_;
 };
 
+// Beads that a quick search by rims shows: of one polarity, and of the other, too.
+struct RimsSeen {
+  double of_its_sign = 0, of_both_signs = 0;
+};
+
 // Another channel in which the beads stand out.
 struct OtherChannel {
   Channel channel = Channel::automatic;
   const GrayFrame* frame = nullptr;
   Polarity polarity = Polarity::automatic;
-  // Beads that a quick search by rims shows: of this polarity, and of the other, too.
-  double by_rims = 0, of_both_signs = 0;
+  RimsSeen rims;
+  bool shows_more = true;  // by rims, than the channel in which the beads were seen
 };
 
 // Those in which rims of one sign show most of the beads, and the one in which rims of both signs show clearly more.
 void keep_most_telling(std::vector<OtherChannel>& others) {
   std::vector<double> ranked;
   ranked.reserve(others.size());
-  for (const OtherChannel& other : others) ranked.push_back(other.by_rims);
+  for (const OtherChannel& other : others) ranked.push_back(other.rims.of_its_sign);
   std::sort(ranked.begin(), ranked.end(), std::greater<>());
   std::size_t kept = 0;
   double most = 0;
   const auto first_left = std::stable_partition(others.begin(), others.end(), [&](const OtherChannel& other) {
-    return other.by_rims >= ranked[most_channels - 1] && ++kept <= most_channels;
+    return other.rims.of_its_sign >= ranked[most_channels - 1] && ++kept <= most_channels;
   });
-  for (auto one = others.begin(); one != first_left; ++one) most = std::max(most, one->of_both_signs);
+  for (auto one = others.begin(); one != first_left; ++one) most = std::max(most, one->rims.of_both_signs);
   const auto of_both = std::max_element(first_left, others.end(), [](const auto& one, const auto& another) {
-    return one.of_both_signs < another.of_both_signs;
+    return one.rims.of_both_signs < another.rims.of_both_signs;
   });
-  const bool worth_it = of_both->of_both_signs > clearly_more * most;
+  const bool worth_it = of_both->rims.of_both_signs > clearly_more * most;
   if (worth_it) std::iter_swap(first_left, of_both);
   others.erase(first_left + (worth_it ? 1 : 0), others.end());
 }
 
+RimsSeen rims_seen(const ChannelTrials& trials, const GrayFrame& picture, Polarity polarity, bool of_both) {
+  const Trial rims = trials.found_by_rims(picture, polarity);
+  const double others = of_both ? trials.rims_beside(rims.disks, picture, opposite(polarity), fewest_of_other_sign) : 0;
+  return {rims.shown(), rims.shown() + others};
+}
+
 // Where this channel shows the beads plainly, a look at the rims excludes the others.
-std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, const SurveyCandidate& best,
-                                               const SurveyOptions& options, bool here_is_plain) {
+std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, const GrayFrame& first,
+                                               const SurveyCandidate& best, const SurveyOptions& options,
+                                               const Trial& here) {
   const ChannelTrials trials(frames, best, options, glance_side_px);
+  const bool of_both = options.polarity == Polarity::automatic;
   std::vector<OtherChannel> others;
   for (const ChannelFrames::One& one : frames.channels) {
     if (one.channel == best.channel) continue;
     const std::optional<Polarity> polarity = trials.polarity_in(one);
-    if (!polarity || (options.polarity != Polarity::automatic && options.polarity != *polarity)) continue;
-    others.push_back({one.channel, &one.frame, *polarity});
+    if (!polarity || (!of_both && options.polarity != *polarity)) continue;
+    others.push_back({one.channel, &one.frame, *polarity, {}});
   }
-  if (here_is_plain || others.size() <= most_channels) return others;
-  for (OtherChannel& other : others) {
-    const Trial rims = trials.found_by_rims(*other.frame, other.polarity);
-    other.by_rims = other.of_both_signs = rims.shown();
-    if (options.polarity == Polarity::automatic)
-      other.of_both_signs +=
-          trials.rims_beside(rims.disks, *other.frame, opposite(other.polarity), fewest_of_other_sign);
-  }
-  keep_most_telling(others);
+  if (here.plain() || others.empty()) return others;
+  for (OtherChannel& other : others) other.rims = rims_seen(trials, *other.frame, other.polarity, of_both);
+  if (others.size() > most_channels) keep_most_telling(others);
+  const RimsSeen rims = rims_seen(trials, first, best.rims.polarity, of_both);
+  for (OtherChannel& other : others) other.shows_more = other.rims.of_both_signs > clearly_more * rims.of_both_signs;
+  // All faces are found here, and look small: they do so there if their rims do.
+  if (!here.by_rims && here.complete()) std::erase_if(others, [](const OtherChannel& one) { return !one.shows_more; });
   return others;
 }
 
@@ -376,13 +392,13 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   settled.by_rims = most.by_rims;
   settled.searched = most.searched;
   const bool plain = most.plain();
-  for (OtherChannel& other : others_worth_a_trial(frames, best, options, plain)) {
+  for (OtherChannel& other : others_worth_a_trial(frames, first->frame, best, options, most)) {
     if (plain && trials.alike(first->frame, *other.frame)) continue;
     const double missing = (clearly_more - 1) * most.expected;
     if (plain && trials.rims_beside(most.disks, *other.frame, options.polarity, missing) <= missing) continue;
     if (plain && options.polarity == Polarity::automatic)
       other.polarity = trials.polarity_of_radius(*other.frame, other.polarity, most.radius_px);
-    Trial there = trials.trial_in(*other.frame, other.polarity, Shades::all);
+    Trial there = trials.trial_in(*other.frame, other.polarity, Shades::all, !other.shows_more);
     if (!better_there(most, there)) continue;
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;
