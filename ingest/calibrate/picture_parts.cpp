@@ -102,6 +102,29 @@ double explained_by_cut(const std::vector<TextureMoments>& lines, std::size_t cu
   return most;
 }
 
+// Parts that overlap by seven eighths, and the number of places in each.
+struct CountedPart {
+  PicturePart part;
+  std::ptrdiff_t places = 0;
+};
+std::vector<CountedPart> counted_parts(const Places& places, int side, int width, int height) {
+  constexpr int steps_a_side = 8;
+  const int step = std::max(1, side / steps_a_side);
+  CountedPart one;
+  one.part.width = std::min(side, width), one.part.height = std::min(side, height);
+  std::vector<CountedPart> parts;
+  for (int top = 0; top < height - one.part.height + step; top += step)
+    for (int left = 0; left < width - one.part.width + step; left += step) {
+      one.part.left = std::min(left, width - one.part.width), one.part.top = std::min(top, height - one.part.height);
+      one.places = std::count_if(places.begin(), places.end(), [&](const auto& place) {
+        const double column = place.first - one.part.left, row = place.second - one.part.top;
+        return column >= 0 && row >= 0 && column < one.part.width && row < one.part.height;
+      });
+      parts.push_back(one);
+    }
+  return parts;
+}
+
 }  // namespace
 
 GrayFrame halved(const GrayFrame& frame) {
@@ -178,22 +201,24 @@ double likeness(const GrayFrame& a, const GrayFrame& b) {
   return spread > 0 ? std::abs(xy - x * y / n) / std::sqrt(spread) : 1;
 }
 
-PicturePart part_with_most(const std::vector<std::pair<double, double>>& places, int side, int width, int height) {
-  constexpr int steps_a_side = 8;
-  const int step = std::max(1, side / steps_a_side);
+PicturePart part_with_most(const Places& places, int side, int width, int height) {
   PicturePart best;
-  best.width = std::min(side, width), best.height = std::min(side, height);
   std::ptrdiff_t most = -1;
-  for (int top = 0; top < height - best.height + step; top += step)
-    for (int left = 0; left < width - best.width + step; left += step) {
-      const int x = std::min(left, width - best.width), y = std::min(top, height - best.height);
-      const auto count = std::count_if(places.begin(), places.end(), [&](const auto& place) {
-        const double column = place.first - x, row = place.second - y;
-        return column >= 0 && row >= 0 && column < best.width && row < best.height;
-      });
-      if (count > most) most = count, best.left = x, best.top = y;
-    }
+  for (const auto& [part, count] : counted_parts(places, side, width, height))
+    if (count > most) most = count, best = part;
   return best;
+}
+
+std::optional<PicturePart> part_half_filled(const Places& places, int side, int width, int height) {
+  constexpr double hardly_filled = 0.75;  // of the most: what is nearer to it shows no more background
+  const std::vector<CountedPart> parts = counted_parts(places, side, width, height);
+  std::ptrdiff_t most = 0;
+  for (const CountedPart& one : parts) most = std::max(most, one.places);
+  const auto nearest = std::min_element(parts.begin(), parts.end(), [&](const auto& one, const auto& other) {
+    return std::abs(2 * one.places - most) < std::abs(2 * other.places - most);
+  });
+  if (static_cast<double>(nearest->places) > hardly_filled * static_cast<double>(most)) return std::nullopt;
+  return nearest->part;
 }
 
 std::vector<PicturePart> parts_that_differ(const GrayFrame& frame) {

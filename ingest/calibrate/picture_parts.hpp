@@ -1,6 +1,7 @@
 #pragma once
 // Parts and copies of a picture, for searches that need not look at all of it.
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -31,8 +32,12 @@ PicturePart busiest_part(const GrayFrame& frame, int side, const ChangeSampling&
 // Size of the correlation of two pictures' levels; 1: they show the same.
 double likeness(const GrayFrame& a, const GrayFrame& b);
 
-// The part of a picture of width x height px, of at most `side` x `side` px, that holds most of the places (x, y).
-PicturePart part_with_most(const std::vector<std::pair<double, double>>& places, int side, int width, int height);
+// (x, y) in a picture, px.
+using Places = std::vector<std::pair<double, double>>;
+// The part of a picture of width x height px, of at most `side` x `side` px, that holds most of the places.
+PicturePart part_with_most(const Places& places, int side, int width, int height);
+// The part of that size whose number of places is nearest to half of this. None where all are filled as much.
+std::optional<PicturePart> part_half_filled(const Places& places, int side, int width, int height);
 
 // The two sides of the straight cut across which the texture of a picture changes most. A cut runs along a row or a
 // column. Texture is the level, and its changes over one and over four pixels. None where no cut explains much of the

@@ -156,10 +156,9 @@ class ChannelTrials {
     const double radius = best.rims.radius_px / frames.reduction;
     factor_ = std::max(1, static_cast<int>(radius / trial_radius_px));
     const int all = factor_ * frames.reduction;
-    std::vector<std::pair<double, double>> places;
-    for (const RimDisk& disk : best.disks) places.emplace_back(disk.circle.x / all, disk.circle.y / all);
+    for (const RimDisk& disk : best.disks) places_.emplace_back(disk.circle.x / all, disk.circle.y / all);
     const GrayFrame& frame = frames.channels.front().frame;
-    part_ = part_with_most(places, side_px, frame.width / factor_, frame.height / factor_);
+    part_ = part_with_most(places_, side_px, frame.width / factor_, frame.height / factor_);
     if (!options.roi) return;
     roi_ = PixelRectangle{options.roi->left / all - part_.left, options.roi->top / all - part_.top,
                           options.roi->width / all, options.roi->height / all};
@@ -204,6 +203,10 @@ class ChannelTrials {
     FindOptions asked = asked_of_run(settled.rims.polarity, options);
     FindOptions find = asked;
     find.quick_rims = true;  // which faces do not depend on
+    if (shows_none_at_the_edge(all, find)) {
+      settled.no_faces = true;
+      return;
+    }
     CalibrationResult learned = learn_beads({&all}, find);
     settled.by_rims = settled.no_faces = !learned.found || learned.calibration.by_rims;
     if (!settled.by_rims && options.search)
@@ -288,6 +291,15 @@ class ChannelTrials {
     return plain || (part_.width == picture.width && part_.height == picture.height);
   }
 
+  // Whether faces are searched in vain in a part that is half filled with beads, and so shows what is behind them.
+  [[nodiscard]] bool shows_none_at_the_edge(const GrayFrame& all, const FindOptions& find) const {
+    const std::optional<PicturePart> edge = part_half_filled(places_, part_.width, all.width, all.height);
+    if (!edge) return false;
+    const GrayFrame part = cut_out(all, *edge);
+    const CalibrationResult learned = learn_beads({&part}, find);
+    return learned.found && learned.calibration.by_rims;
+  }
+
   // The same part of every channel, so that numbers of beads compare.
   [[nodiscard]] GrayFrame small(const GrayFrame& picture) const {
     GrayFrame part = cut_out(factor_ > 1 ? reduced(picture, factor_) : picture, part_);
@@ -312,6 +324,7 @@ class ChannelTrials {
   const ChannelFrames& frames_;
   const SurveyCandidate& best_;
   int factor_ = 1;
+  Places places_;  // of the beads seen, px of the frames of trials
   PicturePart part_;
   std::optional<PixelRectangle> roi_;
 };
