@@ -44,6 +44,12 @@ constexpr double company_reach = 2.8, nearest_company = 1.75;
 constexpr std::size_t fewest_company = 3, share_of_company = 2;
 constexpr double whole_quality = 0.9;  // of a face that looks like all others: a bead though its rim is hidden
 
+// Of the frame that is learned from, whose edges are asked for several times.
+struct MapsOfFrame {
+  const GrayFrame& frame;
+  PictureMaps quick{frame, quick_search.wanted_px}, thorough{frame, thorough_search.wanted_px};
+};
+
 // What a face is by its rim, or by that of its neighbours where it has none: blur, or a neighbour, hides the rims of
 // small beads. Faces that tile something else have one another for neighbours.
 enum class Standing { has_rim, among_beads, doubled_among_beads, alone };
@@ -110,9 +116,9 @@ void check_by_rims(const GrayFrame& frame, const RimModel& rims, FindResult& fou
 
 // Of all beads: those that rims show and that are not reported, or those that seem to lie between the disks found,
 // whichever are more.
-double share_missed(const GrayFrame& frame, const RimModel& rims, const std::vector<Circle>& found, double by_rims,
+double share_missed(PictureMaps& maps, const RimModel& rims, const std::vector<Circle>& found, double by_rims,
                     const std::optional<PixelRectangle>& region) {
-  return share_of_missed(std::max(by_rims, expected_missed_beads(frame, rims, found, region)), found.size());
+  return share_of_missed(std::max(by_rims, expected_missed_beads(maps, rims, found, region)), found.size());
 }
 
 struct Agreement {
@@ -124,7 +130,7 @@ struct Agreement {
   bool not_round = false;             // more of the faces have rims that are plainly not round than errors make so
   [[nodiscard]] bool good() const { return missed <= most_missed_faces && rimless <= most_rimless && !not_round; }
 };
-Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindResult& faces) {
+Agreement compare(PictureMaps& maps, const LearnedRims& rims, const FindResult& faces) {
   Agreement agreement;
   const double near = same_bead * rims.model.radius_px;
   const Nearby by_face(faces.disks.size(), near,
@@ -146,7 +152,7 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
   agreement.all = circles_of(faces.disks);
   for (std::size_t k = 0; k < faces.disks.size(); ++k)
     if (!faces.disks[k].cut) places.push_back(agreement.all[k]);
-  const std::vector<Circle> circles = rims_at(frame, rims.model, places);
+  const std::vector<Circle> circles = rims_at(maps, rims.model, places);
   const std::vector<Standing> standing = standing_of(places, circles);
   std::vector<Circle> seen_rims;  // of the faces
   double rimless = 0;
@@ -157,7 +163,6 @@ Agreement compare(const GrayFrame& frame, const LearnedRims& rims, const FindRes
     rimless += stands ? 0 : 1;
   }
   if (!places.empty()) agreement.rimless = rimless / static_cast<double>(places.size());
-  PictureMaps maps(frame, rims.model.search.wanted_px);
   const std::vector<RimShape> shapes = shapes_of_rims(maps, rims.model, agreement.faces, agreement.all);
   const Departing departing = departing_of(shapes, seen_rims, shared_second(shapes));
   agreement.not_round = departing.more_than_seem() && !departing.most();  // most: the survey has judged them
@@ -181,8 +186,9 @@ void paint(std::vector<std::uint8_t>& pixels, const GrayFrame& frame, const Circ
 // and profile are learned again without them.
 class FacesAndRims {
  public:
-  FacesAndRims(const std::vector<const GrayFrame*>& frames, const FindOptions& asked, const LearnedRims& rims)
-      : frames_(frames), asked_(asked), rims_(rims) {}
+  FacesAndRims(const std::vector<const GrayFrame*>& frames, MapsOfFrame& maps, const FindOptions& asked,
+               const LearnedRims& rims)
+      : frames_(frames), maps_(maps), asked_(asked), rims_(rims) {}
 
   // Faces that are larger than the rims, if learn() found such and nothing else.
   std::optional<CalibrationResult> larger() { return std::exchange(larger_, std::nullopt); }
@@ -199,11 +205,11 @@ class FacesAndRims {
       }
       const GrayFrame& frame = *frames_.back();
       const FindResult found = find_disks(frame, faces.calibration, asked_);
-      const Agreement agreement = compare(frame, rims_, found);
+      const Agreement agreement = compare(maps_.quick, rims_, found);
       if (agreement.good()) {
         faces.calibration.rims = rims_.model;
         faces.calibration.expected_missed =
-            share_missed(frame, rims_.model, agreement.all, agreement.missed_beads, asked_.roi);
+            share_missed(maps_.quick, rims_.model, agreement.all, agreement.missed_beads, asked_.roi);
         faces.calibration.rims_to_be_checked = agreement.rimless > 0 || left_out_;
         // Rims of a packed bed that blur has closed say nothing against its faces.
         if (agreement.rimless > 0 && !left_out_) use_packing(faces, found, agreement.all);
@@ -224,7 +230,7 @@ class FacesAndRims {
     if (!packing_of(frame, found, calibration).convinces()) return;
     calibration.rims = rims_of(calibration);
     calibration.rims_to_be_checked = false;
-    calibration.expected_missed = share_missed(frame, *calibration.rims, all, 0, asked_.roi);
+    calibration.expected_missed = share_missed(maps_.quick, *calibration.rims, all, 0, asked_.roi);
   }
 
   void leave_out(const Agreement& agreement) {
@@ -247,6 +253,7 @@ class FacesAndRims {
   }
 
   const std::vector<const GrayFrame*>& frames_;
+  MapsOfFrame& maps_;  // of the last of them
   const FindOptions& asked_;
   const LearnedRims& rims_;
   std::shared_ptr<const std::vector<std::uint8_t>> left_out_;
@@ -254,24 +261,24 @@ class FacesAndRims {
 };
 
 // Beads that lie close and whose rims mislead, by their faces.
-std::optional<CalibrationResult> as_packed(PackedBed bed, const GrayFrame& frame, const FindOptions& options) {
+std::optional<CalibrationResult> as_packed(PackedBed bed, MapsOfFrame& maps, const FindOptions& options) {
   if (!bed.faces.found) return std::nullopt;
   FinderCalibration& calibration = bed.faces.calibration;
   calibration.rims = rims_of(calibration);
-  calibration.expected_missed = share_missed(frame, *calibration.rims, circles_of(bed.disks), 0, options.roi);
+  calibration.expected_missed = share_missed(maps.quick, *calibration.rims, circles_of(bed.disks), 0, options.roi);
   bed.faces.in_last_frame.emplace().disks = std::move(bed.disks);
   bed.faces.packed = true;
   return std::move(bed.faces);
 }
 
 // The same, learned from each of these radii in turn.
-std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
-                                              const std::vector<double>& radii_px) {
+std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*>& frames, MapsOfFrame& maps,
+                                              const FindOptions& options, const std::vector<double>& radii_px) {
   FindOptions find = options;
   find.polarity = options.seen->polarity;
   for (const double radius : radii_px) {
     find.radius_px = radius;
-    if (auto packed = as_packed(learn_packed_bed(frames, find), *frames.back(), options)) return packed;
+    if (auto packed = as_packed(learn_packed_bed(frames, find), maps, options)) return packed;
   }
   return std::nullopt;
 }
@@ -286,11 +293,11 @@ std::vector<double> packed_radii(const FindOptions& options, const LearnedRims& 
 
 // Disks that agree with the rims and lie apart, all equally far, may be the bright part of shaded spheres that touch:
 // these describe the frame as well, then.
-std::optional<CalibrationResult> learn_touching(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
-                                                const CalibrationResult& faces) {
+std::optional<CalibrationResult> learn_touching(const std::vector<const GrayFrame*>& frames, MapsOfFrame& maps,
+                                                const FindOptions& options, const CalibrationResult& faces) {
   if (options.radius_px || !faces.in_last_frame) return std::nullopt;
   const auto touching = radius_beyond(circles_of(faces.in_last_frame->disks), faces.calibration.radius_px);
-  return touching ? learn_packed(frames, options, {*touching}) : std::nullopt;
+  return touching ? learn_packed(frames, maps, options, {*touching}) : std::nullopt;
 }
 
 // Circles that were not counted; what both searches found once.
@@ -337,12 +344,12 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
   }
 }
 
-double share_missed_of(const GrayFrame& frame, const RimModel& model, const RimsFound& seen,
+double share_missed_of(PictureMaps& maps, const RimModel& model, const RimsFound& seen,
                        const std::optional<PixelRectangle>& region) {
   // Where things lie that are no beads, none are missed.
   std::vector<Circle> taken = not_round_of(model, seen);
   for (const Circle& circle : circles_of(seen.disks)) taken.push_back(circle);
-  return share_of_missed(std::max(seen.expected_missed, expected_missed_beads(frame, model, taken, region)),
+  return share_of_missed(std::max(seen.expected_missed, expected_missed_beads(maps, model, taken, region)),
                          seen.disks.size());
 }
 
@@ -381,7 +388,14 @@ FindResult disks_of(const RimsFound& rims, const FinderCalibration& calibration,
   return result;
 }
 
-CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims& rims, const FindOptions& options) {
+// The rims of a frame, and the disks found by them.
+struct RimsOfFrame {
+  LearnedRims learned;
+  RimsFound found;
+};
+
+CalibrationResult calibration_by_rims(MapsOfFrame& maps, const RimsOfFrame& of, const FindOptions& options) {
+  const auto& [rims, seen] = of;
   CalibrationResult result;
   FinderCalibration& calibration = result.calibration;
   calibration.recorded_px = options.recorded_px;
@@ -392,15 +406,14 @@ CalibrationResult calibration_by_rims(const GrayFrame& frame, const LearnedRims&
   calibration.radius_std_error_px = std::hypot(rims.model.radius_std_error_px, unknown_blur_px);
   calibration.edge_width_px = 1;
   calibration.contrast_level = (rims.model.polarity == Polarity::dark_beads ? -1 : 1) * rims.model.contrast;
-  calibration.width = frame.width;
-  calibration.height = frame.height;
+  calibration.width = maps.frame.width;
+  calibration.height = maps.frame.height;
   calibration.profile.step_px = 1;
   calibration.frames_used = 1;
-  const RimsFound seen = find_rims(frame, rims.model);
   calibration.disks_used = seen.disks.size();
   calibration.rims = rims.model;
   calibration.by_rims = true;
-  calibration.expected_missed = share_missed_of(frame, rims.model, seen, options.roi);
+  calibration.expected_missed = share_missed_of(maps.quick, rims.model, seen, options.roi);
   warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
   result.in_last_frame = disks_of(seen, calibration, options);
@@ -415,32 +428,34 @@ double expected_beads(const std::vector<RimDisk>& disks) {
   return expected;
 }
 
-LearnedRims learn_quickly(const GrayFrame& frame, const FindOptions& options) {
+LearnedRims learn_quickly(MapsOfFrame& of, const FindOptions& options) {
   const BeadsSeen& seen = *options.seen;
-  std::optional<GrayFrame> inside;
-  if (options.roi) inside = seen_inside(frame, *options.roi, beyond_region * seen.radius_px);
-  PictureMaps maps(inside ? *inside : frame, quick_search.wanted_px);
-  LearnedRims rims = learn_rims(maps, seen.polarity, seen.radius_px, Known::beads);
-  learn_gaps(maps, rims, options.one_size);
-  return rims;
+  const auto learned_in = [&](PictureMaps& maps) {
+    LearnedRims rims = learn_rims(maps, seen.polarity, seen.radius_px, Known::beads);
+    learn_gaps(maps, rims, options.one_size);
+    return rims;
+  };
+  if (!options.roi) return learned_in(of.quick);
+  const GrayFrame inside = seen_inside(of.frame, *options.roi, beyond_region * seen.radius_px);
+  PictureMaps maps(inside, quick_search.wanted_px);
+  return learned_in(maps);
 }
 
 // Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
 // clearly more of them. It takes several times as long, and where hardly any bead is missed it has little to add. (The
 // share below which it is left out was set for its time, not by a measurement of what is found.)
-LearnedRims most_telling(const GrayFrame& frame, LearnedRims quick, const FindOptions& options) {
+RimsOfFrame most_telling(MapsOfFrame& maps, RimsOfFrame quick, const FindOptions& options) {
   constexpr double clearly_more = 1.03, hardly_any = 0.05;
-  const RimsFound by_quick = find_rims(frame, quick.model);
-  if (share_missed_of(frame, quick.model, by_quick, options.roi) < hardly_any) return quick;
-  PictureMaps maps(frame, thorough_search.wanted_px);
+  if (share_missed_of(maps.quick, quick.learned.model, quick.found, options.roi) < hardly_any) return quick;
   const auto learned = [&](Polarity polarity) {
-    return learn_rims(maps, polarity, quick.model.radius_px, Known::beads, thorough_search);
+    return learn_rims(maps.thorough, polarity, quick.learned.model.radius_px, Known::beads, thorough_search);
   };
   LearnedRims thorough = learned(options.seen->polarity), either = learned(Polarity::automatic);
   if (expected_beads(either.disks) > clearly_more * expected_beads(thorough.disks)) thorough = std::move(either);
-  learn_gaps(maps, thorough, options.one_size || options.rims_of_one_size);
-  const double by_thorough = expected_beads(find_rims(frame, thorough.model).disks);
-  return by_thorough > clearly_more * expected_beads(by_quick.disks) ? thorough : quick;
+  learn_gaps(maps.thorough, thorough, options.one_size || options.rims_of_one_size);
+  RimsFound found = find_rims(maps.thorough, thorough.model);
+  if (expected_beads(found.disks) <= clearly_more * expected_beads(quick.found.disks)) return quick;
+  return {std::move(thorough), std::move(found)};
 }
 
 FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
@@ -451,35 +466,42 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
 
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   if (!options.seen) return learn_finder(frames, options);
-  const GrayFrame& frame = *frames.back();
-  LearnedRims rims = learn_quickly(frame, options);
+  MapsOfFrame maps{*frames.back()};
+  LearnedRims rims = learn_quickly(maps, options);
+  const auto with_disks = [&] {
+    RimsFound found = find_rims(maps.quick, rims.model);
+    return RimsOfFrame{std::move(rims), std::move(found)};
+  };
+  if (options.quick_rims_only) return calibration_by_rims(maps, with_disks(), options);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
-  if (options.quick_rims_only) return calibration_by_rims(frame, rims, options);
   // Faces do not show whether things are round.
   const GapModel& gaps = *rims.model.gaps;
   const bool of_one_size = gaps.other_sizes.empty() && gaps.not_round.empty();
   if (!options.seen->no_faces) {
-    FacesAndRims faces_and_rims(frames, asked, rims);
+    FacesAndRims faces_and_rims(frames, maps, asked, rims);
     if (auto faces = of_one_size ? faces_and_rims.learn() : std::nullopt) {
-      auto touching = learn_touching(frames, options, *faces);
+      auto touching = learn_touching(frames, maps, options, *faces);
       return std::move(touching ? *touching : *faces);
     }
     if (auto larger = faces_and_rims.larger())
-      if (auto packed = as_packed(packed_bed_of(std::move(*larger), frames, asked), frame, options))
+      if (auto packed = as_packed(packed_bed_of(std::move(*larger), frames, asked), maps, options))
         return std::move(*packed);
-    if (auto packed = learn_packed(frames, options, packed_radii(options, rims))) return std::move(*packed);
+    if (auto packed = learn_packed(frames, maps, options, packed_radii(options, rims))) return std::move(*packed);
   }
-  if (!options.quick_rims) rims = most_telling(frame, std::move(rims), options);
-  return calibration_by_rims(frame, rims, options);
+  const RimsOfFrame quick = with_disks();
+  return calibration_by_rims(maps, options.quick_rims ? quick : most_telling(maps, quick, options), options);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
   FindOptions options;
   options.seen = seen;
   options.one_size = true;
-  return calibration_by_rims(frame, learn_quickly(frame, options), {});
+  MapsOfFrame maps{frame};
+  LearnedRims rims = learn_quickly(maps, options);
+  RimsFound found = find_rims(maps.quick, rims.model);
+  return calibration_by_rims(maps, {std::move(rims), std::move(found)}, {});
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

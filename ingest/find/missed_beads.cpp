@@ -226,10 +226,15 @@ class FreePlaces {
 
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region) {
-  const ScaledPicture at = scaled_for(frame, model.radius_px);
+  PictureMaps maps(frame, quick_search.wanted_px);
+  return expected_missed_beads(maps, model, found, region);
+}
+
+double expected_missed_beads(PictureMaps& maps, const RimModel& model, const std::vector<Circle>& found,
+                             const std::optional<PixelRectangle>& region) {
   // A threshold that was learned at another scale says nothing here.
-  const bool of_this_scale = model.search.wanted_px == quick_radius_px;
-  const EdgeMap edges = edges_of(at, of_this_scale ? model.threshold : 0);
+  const bool of_this_scale = model.search.wanted_px == quick_search.wanted_px;
+  const auto& [at, edges, copies] = maps.scaled_for(model.radius_px, of_this_scale ? model.threshold : 0);
   std::vector<Circle> disks = found;
   for (Circle& disk : disks) {
     disk.x = at.from_frame_x(disk.x);

@@ -18,6 +18,9 @@ namespace shakebed::ingest {
 // looked for, and count by their areas.
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region);
+// The same with maps of quick_search.
+double expected_missed_beads(PictureMaps& maps, const RimModel& model, const std::vector<Circle>& found,
+                             const std::optional<PixelRectangle>& region);
 
 // Of all beads, the share of those missed.
 double share_of_missed(double missed, std::size_t found);

@@ -275,6 +275,10 @@ Roundness roundness_of(PictureMaps& maps, const RimModel& model, const std::vect
 
 RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
   PictureMaps maps(frame, model.search.wanted_px);
+  return find_rims(maps, model);
+}
+
+RimsFound find_rims(PictureMaps& maps, const RimModel& model) {
   const auto& [at, edges, copies] = maps.scaled_for(model.radius_px, model.threshold);
   RimsFound found;
   found.disks = likely_ones(circles_of(edges, model.radius_px / at.scale, model), edges, at, model);
@@ -310,8 +314,12 @@ RimsFound find_rims(const GrayFrame& frame, const RimModel& model) {
 }
 
 std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places) {
-  const ScaledPicture at = scaled_for(frame, model.radius_px, model.search.wanted_px);
-  const EdgeMap edges = find_edges(at.picture, model.threshold);
+  PictureMaps maps(frame, model.search.wanted_px);
+  return rims_at(maps, model, places);
+}
+
+std::vector<Circle> rims_at(PictureMaps& maps, const RimModel& model, const std::vector<Circle>& places) {
+  const auto& [at, edges, copies] = maps.scaled_for(model.radius_px, model.threshold);
   std::vector<Circle> circles;
   for (const Circle& place : places) {
     Circle start = place;

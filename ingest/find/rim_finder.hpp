@@ -107,9 +107,11 @@ struct RimsFound {
 // Disks that are beads with a probability of 0.8 or more, or of 0.5 in the gaps between them. Those whose rims are not
 // round are left out where they are more than errors make so, but for those of a picture in which most are not round.
 RimsFound find_rims(const GrayFrame& frame, const RimModel& model);
+RimsFound find_rims(PictureMaps& maps, const RimModel& model);
 
 // The support of circles of this radius at given places (after a fit that may move them by a third of the radius).
 std::vector<Circle> rims_at(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& places);
+std::vector<Circle> rims_at(PictureMaps& maps, const RimModel& model, const std::vector<Circle>& places);
 
 // Sum over the disks of their doubts, over their number; 1 when there are none.
 double expected_wrong_share(const std::vector<RimDisk>& disks);

@@ -133,6 +133,7 @@ class FilmLearner {
       }
       ++read;
       if (!learns_from(std::move(frame), first_reason)) continue;
+      last_learned_from_ = item->index;
       if (calibrated_.calibration.disks_used >= enough_disks || straight_.size() >= film_.options.calibration_frames)
         break;
     }
@@ -265,11 +266,13 @@ class FilmLearner {
   // Beads of another shade cover area as these do, but not by their contrast.
   void learn_shades() {
     FinderCalibration& calibration = calibrated_.calibration;
-    if (film_.options.second_diameter_m || !calibration.rims || find_.quick_rims_only) return;
+    if (film_.options.second_diameter_m || !calibration.rims) return;
     FindResult found = calibrated_.in_last_frame ? std::move(*calibrated_.in_last_frame)
                                                  : find_beads(straight_.back(), calibration, find_);
-    learn_other_shade(straight_.back(), find_, calibration, found);
+    if (!find_.quick_rims_only) learn_other_shade(straight_.back(), find_, calibration, found);
     if (calibration.other_shade) film_.options.profile_from_coverage = false;
+    const bool all_by_rims = calibration.by_rims && (!calibration.other_shade || calibration.other_shade->by_rims);
+    if (all_by_rims && lens_.plain()) film_.by_rims = FoundByRims{last_learned_from_, std::move(found)};
   }
 
   // What was seen first may be of either kind, or of both.
@@ -403,6 +406,7 @@ class FilmLearner {
   Lens lens_;
   FilmCalibration film_;
   std::vector<GrayFrame> recorded_, straight_;  // frames learned from, as recorded and true
+  std::size_t last_learned_from_ = 0;           // index of the last of them
   CalibrationResult calibrated_;
   double enlargement_ = 1;  // of the pictures
   std::string kinds_why_not_;

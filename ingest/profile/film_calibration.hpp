@@ -10,11 +10,18 @@
 
 namespace shakebed::ingest {
 
+// Beads by their rims, in the frame that they were learned from: what a search there finds again.
+struct FoundByRims {
+  std::size_t frame = 0;  // FrameSource::Item::index
+  FindResult found;
+};
+
 struct FilmCalibration {
   MeasureOptions options;  // as asked for, but places are those of the true frame (see lens.hpp)
   FinderCalibration finder;
   std::optional<FinderCalibration> second;
   bool kinds_together = false;  // both are found by find_two_kinds()
+  std::optional<FoundByRims> by_rims;
   Lens lens;
   double aspect_std_error = 0, lens_radial_std_error = 0;  // of what was found
   int recorded_width = 0, recorded_height = 0;

@@ -67,7 +67,8 @@ void FrameExaminer::find_disks_in(const GrayFrame& frame, FrameFindings& finding
     found = std::move(both.first);
     findings.second = std::move(both.second.disks);
   } else {
-    found = find_beads(frame, film_.finder, find);
+    const bool known = film_.by_rims && film_.by_rims->frame == report.index;
+    found = known ? film_.by_rims->found : find_beads(frame, film_.finder, find);
     if (film_.second) findings.second = find_second(frame, found);
   }
   report.second = findings.second.size();
