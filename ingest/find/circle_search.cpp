@@ -248,19 +248,42 @@ bool worth_fitting(const EdgeMap& edges, const Circle& circle, float sign, doubl
   return met >= fewest_met && 10 * met >= 4 * in_view;
 }
 
-// Votes for centres one radius away from each edge, and where most are gathered in 3 x 3 pixels. The tables are kept
-// from one radius to the next: pages fresh from the system cost more than the votes.
+// Columns of a block of votes.
+constexpr std::size_t block = 64;
+
+// The edges of a map, by blocks of columns and from top to bottom: votes of one after the other are near each other.
+struct EdgesInBlocks {
+  std::vector<float> x, y, unit_x, unit_y;  // filled up to whole lanes with edges that are far outside
+
+  explicit EdgesInBlocks(const EdgeMap& edges) {
+    constexpr float far_outside = -1e6F;
+    const auto block_of = [](const RidgePixel& edge) { return static_cast<std::size_t>(edge.x) / block; };
+    std::vector<std::size_t> next(static_cast<std::size_t>(edges.width) / block + 2);
+    for (const RidgePixel& edge : edges.ridge) ++next[block_of(edge) + 1];
+    for (std::size_t k = 1; k < next.size(); ++k) next[k] += next[k - 1];
+    const std::size_t padded = (edges.ridge.size() + lanes - 1) / lanes * lanes;
+    x.assign(padded, far_outside);
+    for (std::vector<float>* values : {&y, &unit_x, &unit_y}) values->assign(padded, 0);
+    for (const RidgePixel& edge : edges.ridge) {
+      const std::size_t at = next[block_of(edge)]++;
+      x[at] = edge.x, y[at] = edge.y, unit_x[at] = edge.unit_x, unit_y[at] = edge.unit_y;
+    }
+  }
+};
+
+// Votes for centres one radius away from each edge, and where most are gathered in 3 x 3 pixels. All rows of a block of
+// columns lie together in memory: where a row of the picture did, most of the time went into reaching the votes. The
+// tables are kept from one radius to the next: pages fresh from the system cost more than the votes.
 class VoteMap {
  public:
   explicit VoteMap(const EdgeMap& edges)
       : edges_(edges),
         width_(static_cast<std::size_t>(edges.width)),
         height_(static_cast<std::size_t>(edges.height)),
-        votes_(width_ * height_),
-        across_(width_),
-        sums_(window * width_),
         blocks_((width_ + block - 1) / block),
-        voted_(blocks_ * height_),
+        votes_(blocks_ * height_ * block + 1),
+        sums_(window * blocks_ * block),
+        voted_(blocks_ * height_ + 1),
         filled_(window * blocks_) {}
 
   std::vector<Circle> peaks(double radius, float sign, double least_votes) {
@@ -282,37 +305,44 @@ class VoteMap {
 
  private:
   using Count = std::uint16_t;
-  static constexpr std::size_t window = 5, block = 64;  // rows; columns
+  static constexpr std::size_t window = 5;  // rows
 
+  // Those beyond the outermost pixels go to an element after the last one, which nobody reads.
   void vote(float shift) {
-    for (const RidgePixel& edge : edges_.ridge) {
-      const int column = static_cast<int>(edge.x + shift * edge.unit_x + 0.5F);
-      const int row = static_cast<int>(edge.y + shift * edge.unit_y + 0.5F);
-      if (column < 1 || row < 1 || column >= edges_.width - 1 || row >= edges_.height - 1) continue;
-      const auto x = static_cast<std::size_t>(column), y = static_cast<std::size_t>(row);
-      ++votes_[y * width_ + x];
-      voted_[y * blocks_ + x / block] = 1;
+    constexpr int wide = static_cast<int>(block);
+    const int width = static_cast<int>(width_), height = static_cast<int>(height_);
+    const Ints nowhere = Ints{} + static_cast<int>(votes_.size() - 1);
+    for (std::size_t k = 0; k < edges_.x.size(); k += lanes) {
+      Floats x, y, unit_x, unit_y;
+      load(edges_.x.data() + k, x), load(edges_.y.data() + k, y);
+      load(edges_.unit_x.data() + k, unit_x), load(edges_.unit_y.data() + k, unit_y);
+      const Ints column = __builtin_convertvector(x + shift * unit_x + 0.5F, Ints),
+                 row = __builtin_convertvector(y + shift * unit_y + 0.5F, Ints);
+      const Ints inside = (column >= 1) & (row >= 1) & (column < width - 1) & (row < height - 1);
+      const Ints place = inside ? (column / wide * height + row) * wide + column % wide : nowhere;
+      for (int l = 0; l < lanes; ++l) {
+        const auto its = static_cast<std::size_t>(place[l]);
+        ++votes_[its];
+        voted_[its / block] = 1;
+      }
     }
   }
 
   // Most blocks of most pictures hold no vote.
   void clear() {
-    for (std::size_t row = 0; row < height_; ++row)
-      for (std::size_t k = 0; k < blocks_; ++k)
-        if (std::exchange(voted_[row * blocks_ + k], 0) != 0)
-          std::fill(votes_.begin() + static_cast<std::ptrdiff_t>(row * width_ + k * block),
-                    votes_.begin() + static_cast<std::ptrdiff_t>(row * width_ + std::min(width_, (k + 1) * block)),
-                    Count{0});
+    for (std::size_t k = 0; k < blocks_ * height_; ++k)
+      if (std::exchange(voted_[k], 0) != 0)
+        std::fill_n(votes_.begin() + static_cast<std::ptrdiff_t>(k * block), block, Count{0});
   }
 
-  Count* sums_of(std::size_t row) { return sums_.data() + row % window * width_; }
+  Count* sums_of(std::size_t row) { return sums_.data() + row % window * blocks_ * block; }
 
   // Whether there are votes within a block of block `k` in the rows beside `row`.
   [[nodiscard]] bool voted_near(std::size_t row, std::size_t k) const {
     const std::size_t first = k > 0 ? k - 1 : 0, last = std::min(k + 1, blocks_ - 1);
-    for (std::size_t y = row - 1; y <= row + 1; ++y)
-      for (std::size_t x = first; x <= last; ++x)
-        if (voted_[y * blocks_ + x] != 0) return true;
+    for (std::size_t x = first; x <= last; ++x)
+      for (std::size_t y = row - 1; y <= row + 1; ++y)
+        if (voted_[x * height_ + y] != 0) return true;
     return false;
   }
 
@@ -320,21 +350,28 @@ class VoteMap {
   void gather(std::size_t row) {
     for (std::size_t k = 0; k < blocks_; ++k) {
       std::uint8_t& filled = filled_[row % window * blocks_ + k];
-      const std::size_t first = k * block, last = std::min(width_, first + block);
       if (row + 1 < height_ && voted_near(row, k)) {
-        gather(row, std::max<std::size_t>(first, 1), std::min(last, width_ - 1));
+        gather(row, k);
         filled = 1;
       } else if (std::exchange(filled, 0) != 0) {
-        std::fill(sums_of(row) + first, sums_of(row) + last, Count{0});
+        std::fill_n(sums_of(row) + k * block, block, Count{0});
       }
     }
+    sums_of(row)[0] = sums_of(row)[width_ - 1] = 0;
   }
 
-  void gather(std::size_t row, std::size_t first, std::size_t last) {
-    const Count *middle = votes_.data() + row * width_, *above = middle - width_, *below = middle + width_;
-    Count *across = across_.data(), *to = sums_of(row);
-    for (std::size_t k = first - 1; k <= last; ++k) across[k] = static_cast<Count>(above[k] + middle[k] + below[k]);
-    for (std::size_t k = first; k < last; ++k) to[k] = static_cast<Count>(across[k - 1] + across[k] + across[k + 1]);
+  void gather(std::size_t row, std::size_t k) {
+    const Count* middle = votes_.data() + (k * height_ + row) * block;
+    // Sums over three rows, of the columns of the block and one to each side.
+    const auto of_rows = [](const Count* here) { return static_cast<Count>(here[0] + *(here - block) + here[block]); };
+    std::array<Count, block + 2> sums;
+    for (std::size_t column = 0; column < block; ++column) sums[column + 1] = of_rows(middle + column);
+    const std::size_t to_next = height_ * block;
+    sums.front() = k > 0 ? of_rows(middle - to_next + block - 1) : Count{0};
+    sums.back() = k + 1 < blocks_ ? of_rows(middle + to_next) : Count{0};
+    Count* to = sums_of(row) + k * block;
+    for (std::size_t column = 0; column < block; ++column)
+      to[column] = static_cast<Count>(sums[column] + sums[column + 1] + sums[column + 2]);
   }
 
   void find_peaks_in(std::size_t row, Count least, double radius, std::vector<Circle>& peaks) {
@@ -363,10 +400,9 @@ class VoteMap {
     return true;
   }
 
-  const EdgeMap& edges_;
-  std::size_t width_, height_;
-  std::vector<Count> votes_, across_, sums_;
-  std::size_t blocks_;
+  EdgesInBlocks edges_;
+  std::size_t width_, height_, blocks_;
+  std::vector<Count> votes_, sums_;
   std::vector<std::uint8_t> voted_, filled_;  // blocks of the table in which there are votes, of `sums_` that are not 0
 };
 

@@ -422,6 +422,8 @@ CalibrationResult calibration_by_rims(MapsOfFrame& maps, const RimsOfFrame& of, 
   return result;
 }
 
+constexpr double clearly_more = 1.03;  // times as many beads
+
 double expected_beads(const std::vector<RimDisk>& disks) {
   double expected = 0;
   for (const RimDisk& disk : disks) expected += disk.probability;
@@ -441,21 +443,27 @@ LearnedRims learn_quickly(MapsOfFrame& of, const FindOptions& options) {
   return learned_in(maps);
 }
 
-// Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
-// clearly more of them. It takes several times as long, and where hardly any bead is missed it has little to add. (The
-// share below which it is left out was set for its time, not by a measurement of what is found.)
-RimsOfFrame most_telling(MapsOfFrame& maps, RimsOfFrame quick, const FindOptions& options) {
-  constexpr double clearly_more = 1.03, hardly_any = 0.05;
-  if (share_missed_of(maps.quick, quick.learned.model, quick.found, options.roi) < hardly_any) return quick;
+// From this radius: of the sign that was seen or, where they show clearly more, with edges of either sign.
+RimsOfFrame learn_thoroughly(MapsOfFrame& maps, double radius_px, const FindOptions& options) {
   const auto learned = [&](Polarity polarity) {
-    return learn_rims(maps.thorough, polarity, quick.learned.model.radius_px, Known::beads, thorough_search);
+    return learn_rims(maps.thorough, polarity, radius_px, Known::beads, thorough_search);
   };
   LearnedRims thorough = learned(options.seen->polarity), either = learned(Polarity::automatic);
   if (expected_beads(either.disks) > clearly_more * expected_beads(thorough.disks)) thorough = std::move(either);
   learn_gaps(maps.thorough, thorough, options.one_size || options.rims_of_one_size);
   RimsFound found = find_rims(maps.thorough, thorough.model);
-  if (expected_beads(found.disks) <= clearly_more * expected_beads(quick.found.disks)) return quick;
   return {std::move(thorough), std::move(found)};
+}
+
+// Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
+// clearly more of them. It takes several times as long, and where hardly any bead is missed it has little to add. (The
+// share below which it is left out was set for its time, not by a measurement of what is found.)
+RimsOfFrame most_telling(MapsOfFrame& maps, RimsOfFrame quick, const FindOptions& options) {
+  constexpr double hardly_any = 0.05;
+  if (share_missed_of(maps.quick, quick.learned.model, quick.found, options.roi) < hardly_any) return quick;
+  RimsOfFrame thorough = learn_thoroughly(maps, quick.learned.model.radius_px, options);
+  const bool more = expected_beads(thorough.found.disks) > clearly_more * expected_beads(quick.found.disks);
+  return more ? thorough : quick;
 }
 
 FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {
@@ -467,6 +475,8 @@ FindResult find_by_rims(const GrayFrame& frame, const FinderCalibration& calibra
 CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
   if (!options.seen) return learn_finder(frames, options);
   MapsOfFrame maps{*frames.back()};
+  if (options.seen->no_faces && options.seen->thorough)
+    return calibration_by_rims(maps, learn_thoroughly(maps, options.seen->radius_px, options), options);
   LearnedRims rims = learn_quickly(maps, options);
   const auto with_disks = [&] {
     RimsFound found = find_rims(maps.quick, rims.model);

@@ -61,6 +61,7 @@ struct RimModel {
   std::vector<double> probability;  // of a circle with support 0, 1/20, 2/20 .. 1
   std::optional<GapModel> gaps;     // once learn_gaps() has looked
   [[nodiscard]] double probability_of(double support) const;
+  [[nodiscard]] bool thorough() const { return search.wanted_px == thorough_search.wanted_px; }
 };
 
 struct RimDisk {

@@ -65,6 +65,7 @@ struct Trial {
   std::vector<FoundDisk> disks;
   double radius_px = 0, expected = 0;  // beads found, each by its probability
   bool by_rims = true;
+  bool thorough = false;         // rims were searched thoroughly, which showed more
   double wrong = 1, missed = 1;  // shares that are expected, of the disks and of the beads
   std::shared_ptr<SearchedFrame> searched;
   // Radius at which most neighbours would touch, over the radius seen. A channel may show no more of shaded spheres
@@ -94,6 +95,7 @@ bool better_there(const Trial& here, const Trial& there) {
 Trial trial_of(const FinderCalibration& learned, const FindResult& found) {
   Trial trial;
   trial.by_rims = learned.by_rims;
+  trial.thorough = learned.by_rims && learned.rims->thorough();
   trial.radius_px = learned.radius_px;
   for (const FoundDisk& disk : found.disks) trial.expected += disk.probability;
   trial.missed = learned.expected_missed;
@@ -209,6 +211,7 @@ class ChannelTrials {
     }
     CalibrationResult learned = learn_beads({&all}, find);
     settled.by_rims = settled.no_faces = !learned.found || learned.calibration.by_rims;
+    settled.thorough = settled.thorough && settled.by_rims;
     if (!settled.by_rims && options.search)
       settled.searched =
           std::make_shared<SearchedFrame>(std::move(all), frames_.reduction * factor_, asked, std::move(learned));
@@ -403,6 +406,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   Trial most = trials.first_trial(first->frame, options);
   SurveyCandidate settled = best;
   settled.by_rims = most.by_rims;
+  settled.thorough = most.thorough;
   settled.searched = most.searched;
   const bool plain = most.plain();
   for (OtherChannel& other : others_worth_a_trial(frames, first->frame, best, options, most)) {
@@ -416,6 +420,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;
     settled.by_rims = there.by_rims;
+    settled.thorough = there.thorough;
     settled.searched.reset();
     most = std::move(there);
   }

@@ -40,6 +40,7 @@ struct SurveyCandidate {
   double expected_wrong = 0;   // share of the disks
   bool by_rims = false;        // beads will be found by their rims alone, as far as a trial showed
   bool no_faces = false;       // all of a large picture, reduced, was searched for their faces in vain
+  bool thorough = false;       // by rims: a thorough search showed more in a trial
   bool packed = false;         // disks that touch, found by their faces, describe the picture
   bool one_sided = false;      // one side of the rim is hardly seen in any: light from the other side
   bool not_round = false;      // circles are seen, but on outlines that are not round ...

@@ -226,7 +226,7 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
 }
 
 void look_for(const SurveyCandidate& best, FindOptions& find) {
-  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided, best.no_faces};
+  find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided, best.no_faces, best.thorough};
   if (!find.roi) find.roi = best.region;
 }
 
