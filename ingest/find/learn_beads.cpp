@@ -422,7 +422,7 @@ CalibrationResult calibration_by_rims(MapsOfFrame& maps, const RimsOfFrame& of, 
   return result;
 }
 
-constexpr double clearly_more = 1.03;  // times as many beads
+constexpr double worth_the_search = 1.03;  // times as many beads
 
 double expected_beads(const std::vector<RimDisk>& disks) {
   double expected = 0;
@@ -449,7 +449,7 @@ RimsOfFrame learn_thoroughly(MapsOfFrame& maps, double radius_px, const FindOpti
     return learn_rims(maps.thorough, polarity, radius_px, Known::beads, thorough_search);
   };
   LearnedRims thorough = learned(options.seen->polarity), either = learned(Polarity::automatic);
-  if (expected_beads(either.disks) > clearly_more * expected_beads(thorough.disks)) thorough = std::move(either);
+  if (expected_beads(either.disks) > worth_the_search * expected_beads(thorough.disks)) thorough = std::move(either);
   learn_gaps(maps.thorough, thorough, options.one_size || options.rims_of_one_size);
   RimsFound found = find_rims(maps.thorough, thorough.model);
   return {std::move(thorough), std::move(found)};
@@ -462,7 +462,7 @@ RimsOfFrame most_telling(MapsOfFrame& maps, RimsOfFrame quick, const FindOptions
   constexpr double hardly_any = 0.05;
   if (share_missed_of(maps.quick, quick.learned.model, quick.found, options.roi) < hardly_any) return quick;
   RimsOfFrame thorough = learn_thoroughly(maps, quick.learned.model.radius_px, options);
-  const bool more = expected_beads(thorough.found.disks) > clearly_more * expected_beads(quick.found.disks);
+  const bool more = expected_beads(thorough.found.disks) > worth_the_search * expected_beads(quick.found.disks);
   return more ? thorough : quick;
 }
 

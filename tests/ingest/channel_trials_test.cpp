@@ -9,6 +9,7 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/settle_channel.hpp"
+#include "ingest/frames/stop_question.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
 #include "tests/ingest/by_hand.hpp"
 
@@ -348,6 +349,44 @@ TEST(ChannelTrials, TakeTheOutlinesThatTouch) {
       << "of the others two are tried";
   EXPECT_EQ(settled_of_radii(24, {{Channel::red, 7.6}, {Channel::green, 8.8}}).channel, Channel::red)
       << "neighbours are too far apart to say anything";
+}
+
+// How often a call asks whether to stop: as often as it fits a circle.
+template <class Call>
+std::size_t circles_fitted_in(const Call& call) {
+  std::size_t asked = 0;
+  const StopQuestion question([&] { ++asked; });
+  call();
+  return asked;
+}
+
+// Red shows all faces, which look small. Green shows them as small: it is not searched for them.
+TEST(ChannelTrials, TryNoFacesWhereOutlinesAreAsSmall) {
+  const auto fitted = [](double in_green) {
+    return circles_fitted_in([&] { settled_of_radii(18, {{Channel::red, 7.6}, {Channel::green, in_green}}); });
+  };
+  EXPECT_LT(fitted(7.6), fitted(8.8)) << fitted(7.6) << " " << fitted(8.8);
+}
+
+// Rings, half of them darker than the background and half brighter.
+GrayFrame rings_of_both_signs(const std::vector<RenderedDisk>& disks) {
+  std::vector<RenderedDisk> dark, bright;
+  for (const RenderedDisk& disk : disks) (dark.size() > bright.size() ? bright : dark).push_back(disk);
+  std::vector<RenderedDisk> inside = bright;
+  for (RenderedDisk& disk : inside) disk.radius_px -= 2;
+  return sum_of(rings_of(dark), sum_of(test::beads_of_level(bright, 230, 0), test::beads_of_level(inside, 70, 0)));
+}
+
+TEST(ChannelTrials, SayThatAThoroughSearchShowsMore) {
+  const std::vector<RenderedDisk> all = beads_of_trial();
+  TrialFrames beads(all, {}, 230);
+  EXPECT_FALSE(beads.settled().thorough) << "faces";
+  beads.frames.channels[0].frame = rings_of(all);
+  EXPECT_TRUE(beads.settled().by_rims);
+  EXPECT_FALSE(beads.settled().thorough) << "all rims are seen at once";
+  beads.frames.channels[0].frame = rings_of_both_signs(all);
+  const SurveyCandidate settled = beads.settled();
+  EXPECT_TRUE(settled.by_rims && settled.thorough) << settled.by_rims << settled.thorough;
 }
 
 }  // namespace

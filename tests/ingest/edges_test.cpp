@@ -329,6 +329,23 @@ TEST(PictureParts, HoldMostOfThePlacesGiven) {
   EXPECT_EQ(wide.height, 90);
 }
 
+// A bed in the left half of a picture: its edge, at 200 px, runs through the middle of the part.
+TEST(PictureParts, AreHalfFilledAtTheEdgeOfABed) {
+  const auto bed = [](double right) {
+    Places places;
+    for (double x = 5; x < right; x += 10)
+      for (double y = 5; y < 300; y += 10) places.emplace_back(x, y);
+    return places;
+  };
+  const auto part = part_half_filled(bed(200), 120, 400, 300);
+  ASSERT_TRUE(part);
+  EXPECT_NEAR(part->left + 60, 200, 8);
+  EXPECT_EQ(part->width, 120);
+  EXPECT_EQ(part->height, 120);
+  EXPECT_FALSE(part_half_filled(bed(400), 120, 400, 300)) << "all is filled";
+  EXPECT_FALSE(part_half_filled(bed(200), 500, 400, 300)) << "all of the picture is one part";
+}
+
 TEST(SmoothField, HasChebyshevsPolynomials) {
   EXPECT_EQ(polynomial_terms(0), 1U);
   EXPECT_EQ(polynomial_terms(2), 6U);

@@ -83,6 +83,22 @@ TEST(LearnBeads, TriesNoFacesWhereThereAreNone) {
   EXPECT_EQ(learned.in_last_frame->disks.size(), 24U);
 }
 
+// Of beads that a quick search shows, too.
+TEST(LearnBeads, SearchesThoroughlyWhereATrialWasWorthIt) {
+  const std::vector<RenderedDisk> disks = faced_disks(24);
+  const GrayFrame frame = faced_frame(disks);
+  FindOptions options = seen_dark();
+  options.seen->thorough = true;
+  EXPECT_FALSE(learn_beads({&frame}, options).calibration.by_rims) << "faces come first";
+  for (const bool thorough : {false, true}) {
+    options.seen->no_faces = true, options.seen->thorough = thorough;
+    const CalibrationResult learned = learn_beads({&frame}, options);
+    ASSERT_TRUE(learned.found && learned.in_last_frame && learned.calibration.rims);
+    EXPECT_EQ(learned.calibration.rims->thorough(), thorough);
+    EXPECT_EQ(learned.in_last_frame->disks.size(), 24U);
+  }
+}
+
 // Of the circles by rims alone: what each is, from its rim.
 TEST(LearnBeads, ByRimsHasTheNumbersOfItsRims) {
   const std::vector<RenderedDisk> disks = faced_disks(24);

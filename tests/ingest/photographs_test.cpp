@@ -162,7 +162,10 @@ TEST(Photographs, AreSearchedForWhatTheSurveySaw) {
   EXPECT_FALSE(find.roi);
   best.by_rims = true;
   look_for(best, find);
-  EXPECT_FALSE(find.seen->no_faces) << "a trial of a part";
+  EXPECT_FALSE(find.seen->no_faces || find.seen->thorough) << "a trial of a part";
+  best.thorough = true;
+  look_for(best, find);
+  EXPECT_EQ(*find.seen, (BeadsSeen{Polarity::dark_beads, 31, true, false, true}));
   best.no_faces = true, best.region = PixelRectangle{5, 6, 7, 8};
   look_for(best, find);
   EXPECT_TRUE(find.seen->no_faces);
