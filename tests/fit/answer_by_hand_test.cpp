@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 
 #include "fit/profile_fit/answer.hpp"
 #include "fit/profile_fit/chances.hpp"
+#include "fit/profile_fit/measured_profile.hpp"
 #include "fit/profile_fit/thermometers.hpp"
 #include "tests/fit/answer_column.hpp"
 
@@ -175,6 +177,118 @@ TEST(Answer, WidensAnOpenIntervalToItsKineticTemperatures) {
     EXPECT_EQ(both.interval.high, std::max(beyond, inside.interval.high));
     EXPECT_EQ(both.interval.confidence, 0.0);
     EXPECT_EQ(both.temperature, inside.temperature);
+  }
+}
+
+// A gas as thin as this is ideal: by a diameter (1 - e) times as long its T is 1/(1 - e) times as much. With e = 0.3
+// that is farther in ln T, 0.357, than what the longer one changes, 0.262: the larger of both counts.
+TEST(Answer, HasTheLargerEffectOfBothScales) {
+  const auto truth = HydrostaticProfile::of_column(best_of(), 2.0, {0.002, close_packing_density});
+  ASSERT_LT(truth.density(0.1), 0.0011);
+  AnswerInput input;
+  input.base = 0.0;
+  input.scale_error = 0.3;
+  for (double z = 0.25; z < 20; z += 0.5) {
+    input.profile.height.push_back(z);
+    input.profile.number_density.push_back(truth.density(z));
+    // What is left of the error without the scale's is one in a thousand.
+    input.profile.std_error.push_back(truth.density(z) * std::hypot(2 * 0.3, 1e-3));
+  }
+  const Answer answer = find_answer(input);
+  ASSERT_TRUE(answer.ok()) << answer.why;
+  EXPECT_NEAR(answer.statistical_error / answer.temperature, -std::log1p(-0.3), 2e-3);
+}
+
+// T is not even bounded where its interval reaches a factor of e^3 beyond it. All of the uncertainty is the contact
+// duration's here, by the normal distribution: 1.96 times 1.5 and 1.56.
+TEST(Answer, IsNoneWhereItsIntervalReachesAFactorOfTwenty) {
+  AnswerInput input = every(2, column(1.0, 0.001));
+  for (const double effect : {1.5, 1.56}) {
+    input.contact_duration_effect = effect;
+    const Answer answer = find_answer(input);
+    const double reach = 1.959964 * answer.std_error / answer.temperature;
+    EXPECT_EQ(answer.ok(), reach < 3) << answer.why;
+    EXPECT_EQ(answer.status == FitStatus::unreadable, effect > 1.55);
+    EXPECT_EQ(answer.verdict, Verdict::no_single_temperature);
+    if (!answer.ok()) {
+      EXPECT_EQ(answer.why, "The profile does not determine T within a factor of 20.");
+      EXPECT_EQ(answer.advice, "Measure longer, or at more closely spaced heights where the density falls.");
+      EXPECT_NEAR(std::log(answer.interval.high / answer.temperature), 3, 1e-12) << "and no farther";
+    }
+  }
+}
+
+// The middle of a range has half of it for an error.
+TEST(Answer, OfARangeIsItsMiddle) {
+  AnswerInput input = every(2, column(0.5));
+  input.temperature_x = Estimate{0.2, 0.001, false};
+  input.temperature_z = Estimate{0.9, 0.001, false};
+  const Answer answer = find_answer(input);
+  EXPECT_NEAR(answer.temperature, 0.55, 1e-15);
+  EXPECT_NEAR(answer.std_error, 0.35, 1e-15);
+  EXPECT_EQ(answer.interval.low, 0.2);
+  EXPECT_EQ(answer.interval.high, 0.9);
+}
+
+// The height of the solid is that of an Enskog tail below 0.6 per D^2 at the answer's T. Its error is that of the fit
+// and what a T one error higher changes.
+TEST(Answer, HasTheSolidOfItsTemperature) {
+  const AnswerInput input = column(0.12);
+  const Answer answer = find_answer(input);
+  ASSERT_EQ(answer.verdict, Verdict::one_temperature) << answer.why;
+  const auto solid_at = [&](double temperature) {
+    FitOptions options;
+    options.kernel = input.kernel, options.base = input.base;
+    options.window.below_density = 0.6;
+    options.fixed_temperature = temperature;
+    return fit_profile(input.profile, options).solid_height;
+  };
+  const Estimate solid = solid_at(answer.temperature);
+  const double moved = solid_at(answer.temperature + answer.std_error).value - solid.value;
+  EXPECT_GT(std::abs(moved), 0.1 * solid.std_error) << "else this tests half of it";
+  EXPECT_NEAR(answer.solid_height.value, solid.value, 1e-9);
+  EXPECT_NEAR(answer.solid_height.std_error, std::hypot(solid.std_error, moved), 1e-9);
+}
+
+// Of a shaken bed whose model does not fit both are said, the model first.
+TEST(Answer, OfAShakenBedSaysAlsoThatItsModelDoesNotFit) {
+  AnswerInput input = column(2.0);
+  for (std::size_t i = 0; i < input.profile.height.size(); ++i) {
+    const double z = input.profile.height[i];
+    if (z > 8.0 && z < 30.0) input.profile.number_density[i] += 0.06 * std::sin(1.5 * z);
+  }
+  const Answer still = find_answer(input);
+  ASSERT_EQ(still.verdict, Verdict::model_does_not_fit) << still.why;
+  input.shaken = true;
+  const Answer shaken = find_answer(input);
+  EXPECT_EQ(shaken.verdict, Verdict::model_does_not_fit);
+  EXPECT_EQ(shaken.why, still.why +
+                            " The bed is shaken, and its velocities are unknown: T_x (horizontal) and T_z (vertical) "
+                            "may lie outside this range.");
+  EXPECT_EQ(shaken.advice, still.advice);
+  // How much worse it fits than beds in equilibrium do: by the table, and by what a window of 0.5 D leaves of a
+  // crystal's rows, sqrt(3)/2 D apart.
+  const ThermometerReading& whole = still.readings.front();
+  const double rows = std::sqrt(8.0 / 3) * std::exp(-2 * std::pow(std::numbers::pi * 0.5 / std::sqrt(0.75), 2));
+  const double times = whole.model_error / (known_misfit(whole.temperature) + rows);
+  EXPECT_NE(still.why.find("per D^2, " + number(times, 2) + " times as much"), std::string::npos) << still.why;
+}
+
+// Walls take more from a bed that has a crystal: one whose greatest density is above freezing, 0.7 of the area.
+TEST(Answer, IsMoreUncertainByWallsFromFreezingOn) {
+  AnswerInput input = every(3, column(4.0, 0.001));
+  input.kernel = {};
+  input.width_between_walls = 1e9;  // so wide that nothing is put back
+  const double freezing = number_density(freezing_area_fraction);
+  for (const double greatest : {0.999 * freezing, 1.001 * freezing}) {
+    const double most = *std::max_element(input.profile.number_density.begin(), input.profile.number_density.end());
+    for (double& density : input.profile.number_density) density *= greatest / most;
+    const Answer answer = find_answer(input);
+    ASSERT_TRUE(answer.ok()) << answer.why;
+    const auto read = std::find_if(answer.readings.begin(), answer.readings.end(),
+                                   [&](const auto& one) { return one.thermometer == answer.thermometer; });
+    ASSERT_NE(read, answer.readings.end());
+    EXPECT_NEAR(answer.wall_uncertainty * 1e9 / read->temperature, greatest < freezing ? 0.15 : 0.8, 1e-9);
   }
 }
 

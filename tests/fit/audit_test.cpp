@@ -3,6 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include "fit/theory/equation_of_state.hpp"
 
 namespace shakebed::fit {
 namespace {
@@ -45,6 +50,48 @@ TEST(Audit, RecomputesThePaper) {
 TEST(Audit, NamesTheThicknessOfEveryEquation) {
   const std::string text = row("condensation for any pressure").recomputed_text;
   EXPECT_NE(text.find(": mu_0 = 111.311; "), std::string::npos) << text;
+}
+
+// What the explanations state, from the printed formulas: c3/(1 - alpha) in place of c3/(1 - alpha phi_0); 0.441 more
+// area with the shift that the paper multiplies by 1.10; widths of 1000 disks in 20 D or 20 rows of 50.
+TEST(Audit, GivesTheNumbersOfItsExplanations) {
+  const auto holds = [](const std::string& text, double value, const char* digits) {
+    char number[32];
+    std::snprintf(number, sizeof number, digits, value);
+    EXPECT_NE(text.find(number), std::string::npos) << number << " in: " << text;
+  };
+  const EnskogConstants c = enskog_constants();
+  const auto f_of = [&](double third) {
+    const double d = 1 - c.a * 1.10;
+    return std::log(1.10) + c.c1 * 1.10 + c.c2 * std::log(d) + c.c3 / third + c.c4 / (d * d);
+  };
+  const std::string misprint = row("f(phi_0), third term").explanation;
+  holds(misprint, f_of(1 - c.a), " would be %.6g for ");
+  holds(misprint, f_of(1 - c.a * 1.10), " for %.6g");
+  const std::string area = row("area under the published fit").explanation;
+  const double tail = 1.10 * 0.36 / 2.99 * enskog().compressibility_factor(1.10).value;
+  holds(area, 4.41 + tail, "1.10 D the area is %.4g, with");
+  holds(area, 1.10 * 4.41 + tail, "4.41 D %.4g; by");
+  holds(area, 1.10 * 10.2, "must be %.4g");
+  const std::string width = row("width of the bed").recomputed_text;
+  holds(width, 1000 / (20 * 2 / std::sqrt(3)), "W = %.4g D if mu");
+  holds(width, 20 * std::sqrt(3) / 2, "(mu = %.4g D)");
+  holds(row("c4").recomputed_text, c.c4, "/alpha = %.10g");
+  const std::string k = row("k = 2 Lambda_1 phi_0/mu_0^2 - 1").explanation;
+  const double printed = 2 * 5503.531806 * 2 / std::sqrt(3) / (111.52274 * 111.52274) - 1;
+  holds(k, 100 * (5582.604447 / 5503.531806 - 1), "a change of %.2g %% in");
+  holds(k, 0.0405375006220 / printed, "makes it %.3g times");
+  EXPECT_NEAR(row("k = 2 Lambda_1 phi_0/mu_0^2 - 1").printed, printed, 1e-12);
+}
+
+// Each row names where it stands in the paper; those beside one another are found together.
+TEST(Audit, NamesThePlacesInThePaper) {
+  for (const auto& [quantity, place] : {std::pair{"mu_0", "text after eq. (4)"},
+                                        {"Lambda_1", "text after eq. (5)"},
+                                        {"T_c/mg at phi_0 = 1.10", "comparison with the experiment"},
+                                        {"power of mu", "eq. (6)"},
+                                        {"reference [11]", "list of references"}})
+    EXPECT_EQ(row(quantity).place, place);
 }
 
 TEST(Audit, EveryRowSpeaks) {

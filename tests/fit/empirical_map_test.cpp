@@ -102,6 +102,29 @@ TEST(EmpiricalMap, HasTheErrorOfPointsThatAreLeftOut) {
   EXPECT_NEAR(EmpiricalMap({{"gamma", false}}, points).interpolation_error(), std::sqrt(squares), 1e-6);
 }
 
+// An axis along which all beds are alike has no slope and no range: the map is that of the other axis, at this place.
+TEST(EmpiricalMap, IgnoresAnAxisAlongWhichNothingVaries) {
+  std::vector<MapPoint> points, of_one;
+  for (int k = 0; k < 9; ++k) {
+    const double gamma = 2.0 + 0.5 * k, t = 0.1 * gamma * gamma * gamma;
+    points.push_back({{gamma, 0.9}, t, 0.0});
+    of_one.push_back({{gamma}, t, 0.0});
+  }
+  const EmpiricalMap map({{"gamma", true}, {"restitution", false}}, points), one({{"gamma", true}}, of_one);
+  ASSERT_EQ(map.status(), FitStatus::ok) << map.message();
+  for (const double gamma : {2.0, 3.3, 6.0}) {
+    const double here[] = {gamma, 0.9}, above[] = {gamma, 0.91}, below[] = {gamma, 0.89};
+    EXPECT_NEAR(map.at(here).temperature.value, 0.1 * std::pow(gamma, 3), 1e-6) << gamma;
+    EXPECT_NEAR(one.at({here, 1}).temperature.value, map.at(here).temperature.value, 1e-6) << gamma;
+    EXPECT_TRUE(map.at(here).inside) << gamma;
+    EXPECT_FALSE(map.at(above).inside) << gamma;
+    EXPECT_FALSE(map.at(below).inside) << gamma;
+  }
+  const double colder[] = {1.99, 0.9}, hotter[] = {6.01, 0.9};
+  EXPECT_FALSE(map.at(colder).inside);
+  EXPECT_FALSE(map.at(hotter).inside);
+}
+
 TEST(EmpiricalMap, SaysWhereItExtrapolatesOrCannot) {
   const EmpiricalMap map = make_map(0.0);
   const double outside[] = {20.0, 0.7};

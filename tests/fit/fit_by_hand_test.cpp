@@ -828,6 +828,26 @@ TEST(LibraryByHand, OfStraightLinesIsExact) {
   EXPECT_THAT(poor.warnings, ElementsAre(HasSubstr("no bed of the library describes the data")));
 }
 
+// A height without an error, or with one that is less, has the error 1e-4 of the greatest density: else one that is
+// empty in both would decide everything.
+TEST(LibraryByHand, HasALeastError) {
+  std::vector<SimulatedProfile> library;
+  for (const double t : temperatures) library.push_back({t, straight(t, 0), 0});
+  Profile measured = straight(1.2, 0, 0.0002);
+  const double greatest = *std::max_element(measured.number_density.begin(), measured.number_density.end());
+  double squares = 0, along = 0;
+  for (std::size_t i = 0; i < 6; ++i) squares += slope[i] * slope[i], along += slope[i] * (i % 2 == 0 ? 2e-4 : -2e-4);
+  const double chi2 = (6 * 4e-8 - along * along / squares) / std::pow(1e-4 * greatest, 2);
+  for (const double error : {0.0, 0.9e-4 * greatest}) {
+    measured.std_error.assign(6, error);
+    EXPECT_NEAR(match_simulated(measured, library).chi2, chi2, 1e-3) << error;
+  }
+  measured.std_error.clear();
+  EXPECT_NEAR(match_simulated(measured, library).chi2, chi2, 1e-3);
+  measured.std_error.assign(6, 2e-4 * greatest);
+  EXPECT_NEAR(match_simulated(measured, library).chi2, chi2 / 4, 1e-3);
+}
+
 // Beyond its lowest and highest heights a bed of the library holds nothing, and a measurement that reaches farther is
 // compared with that.
 TEST(LibraryByHand, HoldsNothingBeyondItsHeights) {

@@ -203,6 +203,34 @@ TEST(FermiProfile, CenterOfMassRisesAsTheLowTemperatureForm) {
   }
 }
 
+// Without a temperature it is a rectangle: mass, middle and means over a top hat by pencil.
+TEST(FermiProfile, OfNoTemperatureIsARectangle) {
+  const FermiProfile profile{1.1, 8.0, 0.0};
+  EXPECT_NEAR(profile.column_number(), 8.8, 1e-14);
+  EXPECT_EQ(profile.center_of_mass().value, 4.0);
+  const std::vector<double> heights{-0.1, 0.1, 5.0, 8.0, 8.4};
+  std::vector<double> bare(5), seen(5);
+  profile.sample(heights, {}, bare);
+  EXPECT_EQ(bare, (std::vector<double>{0, 1.1, 1.1, 1.1, 0}));
+  profile.sample(heights, {KernelKind::top_hat, 1.0}, seen);
+  const double covered[] = {0.4, 0.6, 1.0, 0.5, 0.1};
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(seen[i], 1.1 * covered[i], 1e-14) << heights[i];
+  EXPECT_EQ((FermiProfile{1.1, -1.0, 0.0}.column_number()), 0);
+  EXPECT_EQ((FermiProfile{1.1, -1.0, 0.0}.center_of_mass().status), ValueStatus::invalid_argument);
+}
+
+// On both sides of where its series ends, exp(-|edge|/theta) = 1/2, and with an edge below the floor.
+TEST(FermiProfile, HasTheMomentsOfItsSums) {
+  for (const double x : {-4.0, -0.70, -0.69, -0.1, 0.1, 0.69, 0.70, 4.0}) {
+    const FermiProfile profile{1.1, 2.0 * x, 2.0};
+    double mass = 0, moment = 0;
+    constexpr double h = 1e-3;
+    for (double z = h / 2; z < 100; z += h) mass += h * profile.density(z), moment += h * z * profile.density(z);
+    EXPECT_NEAR(profile.column_number() / mass, 1, 1e-7) << x;
+    EXPECT_NEAR(profile.center_of_mass().value * mass / moment, 1, 1e-7) << x;
+  }
+}
+
 TEST(FermiProfile, KeepsTheColumnAsked) {
   for (const double theta : {0.0, 0.1, 3.0, 50.0}) {
     EXPECT_NEAR(fermi_profile_of_column(11.22, 1.1, theta).column_number(), 11.22, 1e-12) << theta;

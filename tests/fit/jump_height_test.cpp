@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -75,6 +77,25 @@ TEST(JumpHeight, IsNothingWhileTheFloorHoldsTheBall) {
   }
 }
 
+// A wave that is a sine to 1e-14 goes the general way back, by halving.
+TEST(JumpHeight, IsInvertedForEveryWaveAsForASine) {
+  const WaveForm nearly = WaveForm::series("nearly a sine", {{1, 1.0, 0.0}, {2, 1e-15, 0.0}});
+  for (const JumpHeight kind : jump_heights)
+    for (const double gamma : {1.2, 2.0, 5.0})
+      EXPECT_NEAR(gamma_for_jump_height(kind, jump_height(kind, gamma).value, nearly).value / gamma, 1, 1e-9)
+          << to_string(kind) << " " << gamma;
+  // A ball that does not leave is on a floor of Gamma = 1, and not below the floor's mean position.
+  for (const WaveForm& wave : {WaveForm::sine(), nearly}) {
+    for (const JumpHeight kind :
+         {JumpHeight::relative_max, JumpHeight::above_launch, JumpHeight::above_highest_floor}) {
+      EXPECT_EQ(gamma_for_jump_height(kind, 0, wave).status, ValueStatus::ok) << to_string(kind);
+      EXPECT_NEAR(gamma_for_jump_height(kind, 0, wave).value, 1, 1e-15) << to_string(kind);
+    }
+    EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_mean_floor, 0, wave).status, ValueStatus::outside_range);
+  }
+  EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_mean_floor, 0.5, nearly).status, ValueStatus::outside_range);
+}
+
 TEST(JumpHeight, IsInverted) {
   for (const JumpHeight kind : jump_heights) {
     for (const double gamma : {1.2, 2.0, 4.0, 10.0}) {
@@ -91,6 +112,41 @@ TEST(JumpHeight, IsInverted) {
             ValueStatus::invalid_argument);
   // Above the mean floor the ball is at least Gamma = 1 high as soon as it leaves.
   EXPECT_EQ(gamma_for_jump_height(JumpHeight::above_mean_floor, 0.5).status, ValueStatus::outside_range);
+}
+
+// Floors that let a ball go two to four times a period. Each flight is followed in small steps: the highest of all
+// counts, which is not the same flight for every kind of height, nor the first.
+TEST(JumpHeight, IsTheHighestOfAllLaunchesOfAPeriod) {
+  using Series = std::vector<WaveForm::Harmonic>;
+  for (const Series& harmonics : {Series{{1, 1.0, 0.0}, {2, 0.0, 0.5}}, Series{{1, 1.0, 0.0}, {3, 0.3, 0.0}},
+                                  Series{{1, 1.0, 0.0}, {4, 0.1, 0.05}}}) {
+    const WaveForm wave = WaveForm::series("several", harmonics);
+    for (const double gamma : {2.0, 4.0}) {
+      const auto is_held = [&](double phase) { return 1 + gamma * wave.acceleration(phase) > 0; };
+      std::array<double, 4> highest{};
+      int launches = 0;
+      constexpr int steps = 4000;
+      for (int i = 0; i < steps; ++i) {
+        double held = 2 * pi * i / steps, free = 2 * pi * (i + 1) / steps;
+        if (!is_held(held) || is_held(free)) continue;
+        for (int k = 0; k < 50; ++k) (is_held(0.5 * (held + free)) ? held : free) = 0.5 * (held + free);
+        ++launches;
+        const double from = gamma * wave.position(free), velocity = gamma * wave.velocity(free);
+        double gap = 0, greatest = 0;
+        for (double t = 1e-3; gap >= 0; t += 1e-3) {
+          gap = from + velocity * t - 0.5 * t * t - gamma * wave.position(free + t);
+          greatest = std::max(greatest, gap);
+        }
+        const double rise = velocity > 0 ? 0.5 * velocity * velocity : 0;
+        const double heights[] = {greatest, rise, from + rise, from + rise - gamma * wave.highest()};
+        for (std::size_t k = 0; k < 4; ++k) highest[k] = std::max(highest[k], heights[k]);
+      }
+      EXPECT_GT(launches, 1);
+      for (std::size_t k = 0; k < 4; ++k)
+        EXPECT_NEAR(jump_height(jump_heights[k], gamma, wave).value, highest[k], 2e-6)
+            << to_string(jump_heights[k]) << " " << gamma << " of " << harmonics[1].order;
+    }
+  }
 }
 
 TEST(WaveForm, IsScaledToItsPeakAcceleration) {

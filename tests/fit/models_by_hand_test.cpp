@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fit/inference/posterior.hpp"
@@ -304,6 +305,85 @@ TEST(FitNumbersByHand, HaveTheCriteriaOfUnknownErrors) {
   EXPECT_NEAR(known.chi2, n - 2, 1e-6);
   EXPECT_NEAR(known.aic, n - 2 + 2 * 2, 1e-6);
   EXPECT_NEAR(known.bic, n - 2 + 2 * std::log(n), 1e-6);
+}
+
+// Where T and shift are given nothing is sought: the curve of these, compared with all heights.
+TEST(FitNumbersByHand, WithNothingFreeAreThoseOfTheCurve) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
+  const Profile data = synthetic::profile_of(truth, {}, 30, 16, 0.02, 4);
+  FitOptions options;
+  options.plateau_density = 1.10, options.sweep = options.compare = false;
+  options.fixed_temperature = 0.31, options.fixed_shift = truth.top_of_solid();
+  const FitResult fit = fit_profile(data, options);
+  ASSERT_EQ(fit.status, FitStatus::ok) << fit.message;
+  EXPECT_EQ(fit.dof, fit.bins);
+  EXPECT_TRUE(fit.parameters.empty());
+  EXPECT_TRUE(fit.covariance.empty());
+  EXPECT_EQ(fit.iterations, 0);
+  const auto curve = HydrostaticProfile::tail_over_rectangle(enskog(), 0.31, truth.top_of_solid(), 1.10);
+  double chi2 = 0;
+  for (const Residual& r : fit.residuals) {
+    EXPECT_NEAR(r.model, curve.density(r.height), 1e-12) << r.height;
+    if (r.used) chi2 += std::pow((r.density - r.model) / r.std_error, 2);
+  }
+  EXPECT_NEAR(fit.chi2, chi2, 1e-9 * chi2);
+  EXPECT_NEAR(fit.aic, chi2, 1e-9 * chi2);
+  for (const Estimate& one : {fit.temperature, fit.shift}) {
+    EXPECT_TRUE(one.fixed);
+    EXPECT_EQ(one.std_error, 0);
+  }
+  EXPECT_EQ(fit.temperature.value, 0.31);
+  EXPECT_EQ(fit.shift.value, truth.top_of_solid());
+}
+
+// From a start at the truth one iteration does not reach a minimum to rounding error.
+TEST(FitNumbersByHand, OfTooFewIterationsAreNoMinimum) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.3, {11.22, 1.10});
+  const Profile data = synthetic::profile_of(truth, {}, 30, 16, 0.02, 4);
+  FitOptions options;
+  options.plateau_density = 1.10, options.sweep = options.interval = false;
+  options.max_iterations = 1;
+  const FitResult fit = fit_profile(data, options);
+  EXPECT_EQ(fit.status, FitStatus::not_converged);
+  EXPECT_EQ(fit.message, "no minimum of chi2 was found in 1 iterations. Try another model or window");
+  ASSERT_FALSE(fit.model_comparison.empty());
+  EXPECT_EQ(fit.model_comparison.front().status, FitStatus::not_converged);
+  options.max_iterations = 100;
+  EXPECT_EQ(fit_profile(data, options).status, FitStatus::ok);
+}
+
+// Where all heights have one error, another in every one of them changes no minimum: what makes chi2/dof 1 is then
+// sigma sqrt(chi2/dof - 1), found to 1e-4 in ln(chi2/dof). It is above the root mean square of the residuals with few
+// heights, and far below it where chi2 is hardly too large.
+TEST(FitNumbersByHand, HaveTheErrorOfTheModelThatExplainsTheirResiduals) {
+  const auto truth = HydrostaticProfile::of_column(enskog(), 0.6, {11.22, 1.10});
+  int above = 0, below = 0;
+  for (const auto& [heights, sigma] : {std::pair{9, 0.001}, {60, 0.004}, {60, 0.012}}) {
+    Profile data = synthetic::profile_of(truth, {}, heights, synthetic::top_of(truth), 0, 1);
+    data.std_error.assign(data.height.size(), sigma);
+    for (std::size_t i = 0; i < data.height.size(); ++i)
+      data.number_density[i] += 0.03 * std::sin(2.3 * data.height[i]);
+    FitOptions options;
+    options.plateau_density = 1.10, options.sweep = options.compare = false;
+    options.window.low = 0, options.window.high = 12;
+    options.model_error = false;
+    const FitResult scaled = fit_profile(data, options);
+    options.model_error = true;
+    const FitResult fit = fit_profile(data, options);
+    ASSERT_TRUE(scaled.ok() && fit.ok()) << scaled.message << fit.message;
+    ASSERT_TRUE(fit.misfit);
+    const double ratio = scaled.chi2_per_dof, rms = sigma * std::sqrt(scaled.chi2 / scaled.bins);
+    EXPECT_EQ(scaled.model_error, 0);
+    EXPECT_NEAR((std::pow(fit.model_error / sigma, 2) + 1) / ratio, 1, 1.1e-4) << heights << ' ' << sigma;
+    EXPECT_NEAR(fit.chi2_per_dof, ratio, 1e-6 * ratio) << "by the measured errors alone";
+    EXPECT_NEAR(fit.temperature.value, scaled.temperature.value, 1e-6);
+    EXPECT_NEAR(fit.temperature.std_error / scaled.temperature.std_error, 1, 1e-4);
+    EXPECT_NEAR(scaled.statistical_error * std::sqrt(ratio) / scaled.temperature.std_error, 1, 1e-9);
+    EXPECT_NEAR(fit.statistical_error / scaled.statistical_error, 1, 1e-4);
+    above += fit.model_error > rms, below += fit.model_error < 0.9 * rms;
+  }
+  EXPECT_GT(above, 0);
+  EXPECT_EQ(below, 1);
 }
 
 // From (1, 0): the farthest point first, then always the one that is farthest from all chosen.

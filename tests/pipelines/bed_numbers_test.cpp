@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <numbers>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "fit/theory/equation_of_state.hpp"
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/table.hpp"
 #include "pipelines/formats/trajectory.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "tests/pipelines/program.hpp"
@@ -387,7 +389,7 @@ TEST(DisksInFreeFlight, KeepTheSpinsOfTheFileTheyStartFrom) {
   write_text(folder / "r.json", R"({ "name": "t", "stages": [ { "stage": "simulate", "id": "bed", "seed": 2,
       "units": "reduced", "disks": { "count": 3, "inertia": "sphere", "friction": 0.3 }, "box": { "width": 9 },
       "start": { "kind": "file", "file": "start.extxyz" }, "settle": 0, "measure": 0.1, "frames": { "count": 1 },
-      "compress": false } ] })");
+      "compress": false, "observe": ["velocities"] } ] })");
   const ProgramResult ran = run_shakebed({"run", "r.json", "--out", "o"}, folder.path());
   ASSERT_EQ(ran.exit_code, 0) << ran.err;
   shakebed::pipelines::TrajectoryReader reader(folder / "o/bed/trajectory.extxyz");
@@ -395,6 +397,15 @@ TEST(DisksInFreeFlight, KeepTheSpinsOfTheFileTheyStartFrom) {
   ASSERT_TRUE(reader.read(seen));
   EXPECT_EQ(seen.spin, frame.spin);
   EXPECT_EQ(seen.vx, frame.vx);
+  // The histogram of velocities is in units of sqrt(T) at the first look: (0.01 + 0.04 + 0.09 across, and (49 + 64 +
+  // 1)/900 about the mean upwards)/6. Places are rounded to a tenth: 0.474, -0.949 and 1.423.
+  const std::filesystem::path histogram = folder / "o/bed/velocity_histogram.csv";
+  EXPECT_NEAR(shakebed::pipelines::table_notes(histogram)["temperature"].get<double>(), 2.0 / 45, 1e-6);
+  const NumberTable bins(histogram);
+  for (std::size_t r = 0; r < bins.rows(); ++r) {
+    const double u = bins("velocity", r);
+    EXPECT_NEAR(bins("density_x", r), u == 0.5 || u == -0.9 || u == 1.4 ? 10.0 / 3 : 0, 1e-5) << u;
+  }
 }
 
 // Rows of six that hardly move: the lowest row is 6.06 D wide and sqrt(3)/2 D high.

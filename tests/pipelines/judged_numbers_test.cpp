@@ -33,15 +33,15 @@ using testing::StartsWith;
 struct OddBed {
   int count = 61;
   double width = 10.3, amplitude = 1, frequency = 0.5, settle = 40;  // Gamma = 9.87
-  std::string lid = "\"open\"", sides = R"("hard")";
+  std::string lid = "\"open\"", sides = R"("hard")", second = "";
 };
 std::vector<Warning> warnings_of(const OddBed& bed) {
   std::vector<Problem> problems;
   const std::string recipe = fmt::format(
       R"({{ "name": "odd", "stages": [ {{ "stage": "simulate", "id": "bed", "units": "reduced",
-      "disks": {{ "count": {}, "restitution": 0.9 }}, "box": {{ "width": {}, "lid": {}, "sides": {} }},
+      "disks": {{ "count": {}, "restitution": 0.9{} }}, "box": {{ "width": {}, "lid": {}, "sides": {} }},
       "floor": {{ "motion": "sinusoidal", "amplitude": {}, "frequency": {}, "restitution": 0.9 }}, "settle": {}, "measure": 10 }} ] }})",
-      bed.count, bed.width, bed.lid, bed.sides, bed.amplitude, bed.frequency, bed.settle);
+      bed.count, bed.second, bed.width, bed.lid, bed.sides, bed.amplitude, bed.frequency, bed.settle);
   const ScratchFolder folder;
   return make_plan(*parse_json(recipe, "r.json", problems), "r.json", folder.path()).warnings;
 }
@@ -107,6 +107,36 @@ TEST(OddBeds, AreNarrowHighOrBelowALowLid) {
   EXPECT_EQ(only(low).kind, "low lid");
   EXPECT_THAT(only(low).problem.what,
               StartsWith("the lid is 7.19 above the floor's mean position, but the bed at rest reaches 7.19615 when"));
+}
+
+// No cell is 5 m wide: with fewer disks than one a diameter, millimetres were probably meant. One D is 10 mm here.
+TEST(OddBeds, AreWiderThanAnyCell) {
+  const auto kinds = [](int count, double width) {
+    std::vector<Problem> problems;
+    const std::string recipe = fmt::format(
+        R"({{ "name": "odd", "stages": [ {{ "stage": "simulate", "id": "bed", "gravity": "9.81 m/s^2",
+        "disks": {{ "count": {}, "diameter": "10 mm", "restitution": 0.9 }}, "box": {{ "width": {}, "sides": "periodic" }},
+        "floor": {{ "motion": "sinusoidal", "gamma": 4, "frequency": "20 Hz", "restitution": 0.9 }}, "settle": "1 s",
+        "measure": "1 s" }} ] }})",
+        count, width);
+    const ScratchFolder folder;
+    std::vector<std::string> all;
+    for (const Warning& one : make_plan(*parse_json(recipe, "r.json", problems), "r.json", folder.path()).warnings)
+      all.push_back(one.kind);
+    return all;
+  };
+  EXPECT_THAT(kinds(499, 5), ElementsAre("wide box"));
+  EXPECT_THAT(kinds(500, 5), IsEmpty()) << "one a diameter";
+  EXPECT_THAT(kinds(490, 4.99), IsEmpty());
+}
+
+// Disks of half the diameter take a fourth of the room: 460 and 461 as before.
+TEST(OddBeds, OfTwoSizesAreAsHighAsTheirAreas) {
+  const auto kinds = [](int small) {
+    return kinds_of({.count = 3000, .second = fmt::format(R"(, "second": {{ "count": {}, "diameter": 0.5 }})", small)});
+  };
+  EXPECT_THAT(kinds(4 * 460), IsEmpty());
+  EXPECT_THAT(kinds(4 * 461), ElementsAre("high bed"));
 }
 
 TEST(OddBeds, SettleForFewerThanTenPeriods) {

@@ -33,6 +33,10 @@ double time_by_steps(double density, double young, double poisson, double diamet
 TEST(Materials, HaveHertzsContactTime) {
   const auto agree = [](Material material, double density, double young, double poisson, double diameter,
                         double speed) {
+    const MaterialConstants& constants = constants_of(material);
+    EXPECT_EQ(constants.density, density) << constants.name;
+    EXPECT_EQ(constants.young_modulus, young) << constants.name;
+    EXPECT_EQ(constants.poisson_ratio, poisson) << constants.name;
     EXPECT_NEAR(hertz_contact_time(constants_of(material), diameter, speed) /
                     time_by_steps(density, young, poisson, diameter, speed),
                 1, 1e-3)

@@ -378,12 +378,10 @@ TEST(ProposalsForAPicture, GiveTheRegionOfTheBeads) {
   bed.look.survey.candidates[0].credible = false;
   bed.add(200, 30, 0.4);
   bed.look.width = 900;  // so it is said
-  bed.add(800, 30, 1);
-  // In the list the outermost on the left follows the one that lies far off.
-  std::vector<ingest::RimDisk>& disks = bed.look.survey.candidates[0].disks;
-  std::sort(disks.begin(), disks.end(), [](const auto& a, const auto& b) { return a.circle.x < b.circle.x; });
-  std::rotate(disks.begin(), disks.end() - 1, disks.end());
-  double left = 1e9, top = 1e9, right = 0, bottom = 0;
+  // In the list the outermost on the right follows the one that lies far off, to the right and below.
+  bed.add(800, 800, 1);
+  bed.add(233, 60, 1);
+  double left = 1e9, top = 1e9, right = 233 + 25, bottom = 0;
   for (const Place& place : bed.places) {
     left = std::min(left, place.x - 25), right = std::max(right, place.x + 25);
     top = std::min(top, place.y - 25), bottom = std::max(bottom, place.y + 25);

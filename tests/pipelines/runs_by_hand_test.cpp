@@ -412,6 +412,10 @@ TEST_F(SweepsByHand, SayWhatTheyDid) {
   EXPECT_THAT(said, testing::Not(HasSubstr("error: point 000020")));
   EXPECT_THAT(said, HasSubstr("error: 2 more points failed\n"));
   EXPECT_THAT(out, testing::StartsWith("0 of 22 points done, 22 failed (run again to repeat only these) in "));
+  EXPECT_EQ(run(this->plan(fit, R"("sweep": { "over": { "/stages/f/column_number": [31, 32] } }, )")),
+            exit_stage_failed);
+  EXPECT_THAT(said, HasSubstr("error: point 000001: f (fit): "));
+  EXPECT_THAT(said, testing::Not(HasSubstr("more points failed")));
   testing::internal::CaptureStderr();
 }
 

@@ -342,7 +342,7 @@ TEST(CsvText, UnderstandsQuotes) {
   const std::string text = "x,\"a\"\"b\"";
   EXPECT_EQ(split_csv_line(std::string_view(text).substr(0, 5)), (Cells{"x", "a"}));
   std::vector<std::size_t> numbers;
-  each_csv_line("h\r\n\n# c\n1,2\r\n3", [&](const Cells& cells, std::size_t line) {
+  each_csv_line("h\r\n\r\n# c\n1,2\r\n3", [&](const Cells& cells, std::size_t line) {
     numbers.push_back(line);
     EXPECT_EQ(cells, line == 1 ? Cells{"h"} : line == 4 ? (Cells{"1", "2"}) : Cells{"3"});
   });

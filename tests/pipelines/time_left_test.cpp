@@ -28,6 +28,8 @@ TEST(LongParts, AreTenTimesTheMedian) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].part, 4U);
   EXPECT_EQ(found[0].median, 6);
+  EXPECT_TRUE(long_parts({4, 5, 6, 7, 59.9}).empty());
+  EXPECT_EQ(long_parts({4, 5, 6, 7, 60.1}).size(), 1U);
 }
 
 TEST(LongParts, AreNoneOfTwo) { EXPECT_TRUE(long_parts({1, 1000}).empty()); }
