@@ -368,6 +368,20 @@ TEST(ChannelTrials, TryNoFacesWhereOutlinesAreAsSmall) {
   EXPECT_LT(fitted(7.6), fitted(8.8)) << fitted(7.6) << " " << fitted(8.8);
 }
 
+// Of 18 beads one is hollow in red. Its rim is seen there, so that rims show no more in green, but one face does.
+TEST(ChannelTrials, TryFacesWhereSomeAreMissed) {
+  std::vector<RenderedDisk> beads = beads_of_trial();
+  beads.resize(18);
+  TrialFrames frames(beads, beads, 230);
+  GrayFrame& red = frames.frames.channels[0].frame;
+  for (int row = 0; row < red.height; ++row)
+    for (int column = 0; column < red.width; ++column)
+      if (std::hypot(column - beads[7].x_px, row - beads[7].y_px) < 6.5) test::set(red, column, row, 150);
+  const SurveyCandidate settled = frames.settled();
+  EXPECT_EQ(settled.channel, Channel::green);
+  EXPECT_FALSE(settled.by_rims);
+}
+
 // Rings, half of them darker than the background and half brighter.
 GrayFrame rings_of_both_signs(const std::vector<RenderedDisk>& disks) {
   std::vector<RenderedDisk> dark, bright;
@@ -385,7 +399,14 @@ TEST(ChannelTrials, SayThatAThoroughSearchShowsMore) {
   EXPECT_TRUE(beads.settled().by_rims);
   EXPECT_FALSE(beads.settled().thorough) << "all rims are seen at once";
   beads.frames.channels[0].frame = rings_of_both_signs(all);
-  const SurveyCandidate settled = beads.settled();
+  EXPECT_TRUE(beads.settled().thorough);
+  std::vector<RenderedDisk> half;
+  for (std::size_t k = 0; k < all.size(); k += 2) half.push_back(all[k]);
+  TrialFrames other(half, {}, 230);
+  other.frames.channels[0].frame = rings_of(half);
+  other.frames.channels[1].frame = rings_of_both_signs(all);
+  const SurveyCandidate settled = other.settled();
+  EXPECT_EQ(settled.channel, Channel::green);
   EXPECT_TRUE(settled.by_rims && settled.thorough) << settled.by_rims << settled.thorough;
 }
 

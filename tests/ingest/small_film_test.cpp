@@ -102,6 +102,39 @@ TEST(SmallFilm, HasThePlacesOfItsDisks) {
   EXPECT_FALSE(found.floor_out_of_view || found.surface_out_of_view);
 }
 
+// Rims are learned from the second frame, since the first shows nothing. Disks belong to their own frame.
+TEST(SmallFilm, ByRimsHasTheDisksOfEachFrame) {
+  MeasureOptions options = small_options();
+  options.find.seen->no_faces = true;
+  options.calibration_frames = 1;
+  std::vector<std::vector<RenderedDisk>> drawn = {{}, four_rows(), four_rows(12)};
+  drawn[2].pop_back();
+  const Measurement found = measured({small_frame(drawn[0]), small_frame(drawn[1]), small_frame(drawn[2])}, options);
+  EXPECT_TRUE(found.finder.by_rims);
+  ASSERT_EQ(found.disks.size(), 47U);
+  std::array<std::size_t, 3> in_frame{};
+  for (const MeasuredDisk& disk : found.disks) {
+    ++in_frame.at(disk.frame);
+    const bool drawn_there = std::any_of(drawn[disk.frame].begin(), drawn[disk.frame].end(), [&](const auto& one) {
+      return std::hypot(one.x_px - disk.x_px, one.y_px - disk.y_px) < 1;
+    });
+    EXPECT_TRUE(drawn_there) << disk.frame << " " << disk.x_px << " " << disk.y_px;
+  }
+  EXPECT_EQ(in_frame, (std::array<std::size_t, 3>{0, 24, 23}));
+}
+
+// The border of a region is another one behind a lens that is given: the frame that was learned from is searched again.
+TEST(SmallFilm, ByRimsThroughALensHasAsManyDisksInTheFirstFrame) {
+  MeasureOptions options = small_options();
+  options.find.seen->no_faces = true;
+  options.lens_radial = 0.1;
+  options.find.roi = PixelRectangle{0, 0, 144, 84};
+  const Measurement found = measured({small_frame(four_rows()), small_frame(four_rows())}, options);
+  ASSERT_EQ(found.frames.size(), 2U);
+  EXPECT_TRUE(found.finder.by_rims);
+  EXPECT_EQ(found.frames[0].disks, found.frames[1].disks);
+}
+
 // Beads cut by the upper border: the profile ends below them. By the lower one: the floor is not in view.
 TEST(SmallFilm, EndsWhereItsBordersCutBeads) {
   MeasureOptions options = small_options();
