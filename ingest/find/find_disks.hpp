@@ -43,7 +43,7 @@ struct BeadsSeen {
   Polarity polarity = Polarity::automatic;
   double radius_px = 0;
   bool one_sided = false;  // one side of the rim is hardly seen: the radius is that of a part of the bead
-  bool no_faces = false;   // all of the picture was searched for their faces in vain
+  bool no_faces = false;   // they were searched for their faces in vain (SurveyCandidate::no_faces)
   bool thorough = false;   // in a part of it a thorough search by rims showed clearly more than a quick one
   bool operator==(const BeadsSeen&) const = default;
 };

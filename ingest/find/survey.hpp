@@ -39,16 +39,17 @@ struct SurveyCandidate {
   double explained_share = 0;  // of all edges at this scale
   double expected_wrong = 0;   // share of the disks
   bool by_rims = false;        // beads will be found by their rims alone, as far as a trial showed
-  bool no_faces = false;       // all of a large picture, reduced, was searched for their faces in vain
-  bool thorough = false;       // by rims: a thorough search showed more in a trial
-  bool packed = false;         // disks that touch, found by their faces, describe the picture
-  bool one_sided = false;      // one side of the rim is hardly seen in any: light from the other side
-  bool not_round = false;      // circles are seen, but on outlines that are not round ...
-  std::string why_not_round;   // ... a sentence
-  std::string why_drawn;       // marks of a plot or a drawing, a sentence; empty: they may be beads
-  bool credible = false;       // "no beads here" does not explain the picture as well
-  std::string why_not;         // a sentence, unless credible
-  bool few_edges = false;      // they may be beads, but other things make up the picture
+  // A large picture, reduced, was searched for their faces in vain: all of it, or a part half filled with beads.
+  bool no_faces = false;
+  bool thorough = false;      // by rims: a thorough search showed more in a trial
+  bool packed = false;        // disks that touch, found by their faces, describe the picture
+  bool one_sided = false;     // one side of the rim is hardly seen in any: light from the other side
+  bool not_round = false;     // circles are seen, but on outlines that are not round ...
+  std::string why_not_round;  // ... a sentence
+  std::string why_drawn;      // marks of a plot or a drawing, a sentence; empty: they may be beads
+  bool credible = false;      // "no beads here" does not explain the picture as well
+  std::string why_not;        // a sentence, unless credible
+  bool few_edges = false;     // they may be beads, but other things make up the picture
   // The circles are no chance, so they may be beads of another shape, smaller than those that are believed unasked, or
   // lit from one side.
   bool plausible = false;
