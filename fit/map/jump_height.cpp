@@ -433,7 +433,7 @@ Value gamma_for_jump_height(JumpHeight kind, double height, const WaveForm& wave
     return no_value(ValueStatus::invalid_argument);
   }
   if (wave.pure_sine()) return gamma_of_sine(kind, height);
-  if (height == 0.0 && kind != JumpHeight::above_mean_floor) return {1.0};
+  if (height == 0.0 && kind != JumpHeight::above_mean_floor) return {1.0};  // it hardly leaves the floor
   double low = 1.0;
   double high = 2.0;
   while (jump_height(kind, high, wave).value < height) {

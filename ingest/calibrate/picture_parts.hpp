@@ -36,7 +36,7 @@ double likeness(const GrayFrame& a, const GrayFrame& b);
 using Places = std::vector<std::pair<double, double>>;
 // The part of a picture of width x height px, of at most `side` x `side` px, that holds most of the places.
 PicturePart part_with_most(const Places& places, int side, int width, int height);
-// The part of that size whose number of places is nearest to half of this. None where all are filled as much.
+// The part of that size whose number of places is nearest to half of the most. None where all are filled as much.
 std::optional<PicturePart> part_half_filled(const Places& places, int side, int width, int height);
 
 // The two sides of the straight cut across which the texture of a picture changes most. A cut runs along a row or a

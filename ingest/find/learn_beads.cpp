@@ -443,6 +443,11 @@ LearnedRims learn_quickly(MapsOfFrame& of, const FindOptions& options) {
   return learned_in(maps);
 }
 
+RimsOfFrame with_disks(PictureMaps& maps, LearnedRims rims) {
+  RimsFound found = find_rims(maps, rims.model);
+  return {std::move(rims), std::move(found)};
+}
+
 // From this radius: of the sign that was seen or, where they show clearly more, with edges of either sign.
 RimsOfFrame learn_thoroughly(MapsOfFrame& maps, double radius_px, const FindOptions& options) {
   const auto learned = [&](Polarity polarity) {
@@ -451,8 +456,7 @@ RimsOfFrame learn_thoroughly(MapsOfFrame& maps, double radius_px, const FindOpti
   LearnedRims thorough = learned(options.seen->polarity), either = learned(Polarity::automatic);
   if (expected_beads(either.disks) > worth_the_search * expected_beads(thorough.disks)) thorough = std::move(either);
   learn_gaps(maps.thorough, thorough, options.one_size || options.rims_of_one_size);
-  RimsFound found = find_rims(maps.thorough, thorough.model);
-  return {std::move(thorough), std::move(found)};
+  return with_disks(maps.thorough, std::move(thorough));
 }
 
 // Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
@@ -478,11 +482,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   if (options.seen->no_faces && options.seen->thorough)
     return calibration_by_rims(maps, learn_thoroughly(maps, options.seen->radius_px, options), options);
   LearnedRims rims = learn_quickly(maps, options);
-  const auto with_disks = [&] {
-    RimsFound found = find_rims(maps.quick, rims.model);
-    return RimsOfFrame{std::move(rims), std::move(found)};
-  };
-  if (options.quick_rims_only) return calibration_by_rims(maps, with_disks(), options);
+  if (options.quick_rims_only) return calibration_by_rims(maps, with_disks(maps.quick, std::move(rims)), options);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;
   if (!asked.radius_px) asked.radius_px = rims.model.radius_px;
@@ -500,8 +500,9 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
         return std::move(*packed);
     if (auto packed = learn_packed(frames, maps, options, packed_radii(options, rims))) return std::move(*packed);
   }
-  const RimsOfFrame quick = with_disks();
-  return calibration_by_rims(maps, options.quick_rims ? quick : most_telling(maps, quick, options), options);
+  RimsOfFrame found = with_disks(maps.quick, std::move(rims));
+  if (!options.quick_rims) found = most_telling(maps, std::move(found), options);
+  return calibration_by_rims(maps, found, options);
 }
 
 CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
@@ -509,9 +510,7 @@ CalibrationResult learn_by_rims(const GrayFrame& frame, const BeadsSeen& seen) {
   options.seen = seen;
   options.one_size = true;
   MapsOfFrame maps{frame};
-  LearnedRims rims = learn_quickly(maps, options);
-  RimsFound found = find_rims(maps.quick, rims.model);
-  return calibration_by_rims(maps, {std::move(rims), std::move(found)}, {});
+  return calibration_by_rims(maps, with_disks(maps.quick, learn_quickly(maps, options)), {});
 }
 
 FindResult find_beads(const GrayFrame& frame, const FinderCalibration& calibration, const FindOptions& options) {

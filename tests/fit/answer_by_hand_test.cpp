@@ -252,11 +252,7 @@ TEST(Answer, HasTheSolidOfItsTemperature) {
 
 // Of a shaken bed whose model does not fit both are said, the model first.
 TEST(Answer, OfAShakenBedSaysAlsoThatItsModelDoesNotFit) {
-  AnswerInput input = column(2.0);
-  for (std::size_t i = 0; i < input.profile.height.size(); ++i) {
-    const double z = input.profile.height[i];
-    if (z > 8.0 && z < 30.0) input.profile.number_density[i] += 0.06 * std::sin(1.5 * z);
-  }
+  AnswerInput input = column_with_a_wave();
   const Answer still = find_answer(input);
   ASSERT_EQ(still.verdict, Verdict::model_does_not_fit) << still.why;
   input.shaken = true;

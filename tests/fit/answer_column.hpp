@@ -23,7 +23,17 @@ inline AnswerInput column(double temperature, double noise = 0.003, std::uint64_
   return input;
 }
 
-// The same at every `step`-th height, whose answer takes so much less time.
+// A column with a wave in the middle of its height: every reading may agree, and yet no curve of the model has it.
+inline AnswerInput column_with_a_wave() {
+  AnswerInput input = column(2.0);
+  for (std::size_t i = 0; i < input.profile.height.size(); ++i) {
+    const double z = input.profile.height[i];
+    if (z > 8.0 && z < 30.0) input.profile.number_density[i] += 0.06 * std::sin(1.5 * z);
+  }
+  return input;
+}
+
+// A column at every `step`-th height, whose answer takes so much less time.
 inline AnswerInput every(std::size_t step, AnswerInput input) {
   Profile fewer;
   for (std::size_t i = 0; i < input.profile.height.size(); i += step) {

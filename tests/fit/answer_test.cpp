@@ -405,14 +405,8 @@ TEST(Answer, IsARangeWhereTheDepthDecides) {
   EXPECT_GT(answer.interval.high, 1.0);
 }
 
-// A gap in the middle of the bed: every reading may agree, and yet no curve of the model has it.
 TEST(Answer, SaysWhereTheModelDoesNotFit) {
-  AnswerInput input = column(2.0);
-  for (std::size_t i = 0; i < input.profile.height.size(); ++i) {
-    const double z = input.profile.height[i];
-    if (z > 8.0 && z < 30.0) input.profile.number_density[i] += 0.06 * std::sin(1.5 * z);
-  }
-  const Answer answer = find_answer(input);
+  const Answer answer = find_answer(column_with_a_wave());
   ASSERT_TRUE(answer.ok());
   EXPECT_EQ(answer.verdict, Verdict::model_does_not_fit) << answer.why;
   EXPECT_THAT(answer.why, testing::HasSubstr("deviates from the densities"));
