@@ -564,4 +564,12 @@ Circle in_the_frame(Circle circle, const ScaledPicture& at) {
   return circle;
 }
 
+Places places_of(const std::vector<Circle>& circles, int reduction) {
+  Places places;
+  places.reserve(circles.size());
+  for (const Circle& circle : circles)
+    places.emplace_back((circle.x + 0.5) / reduction - 0.5, (circle.y + 0.5) / reduction - 0.5);
+  return places;
+}
+
 }  // namespace shakebed::ingest

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/calibrate/calibration.hpp"
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/find/edge_map.hpp"
 #include "ingest/find/picture_scale.hpp"
 
@@ -24,6 +25,8 @@ struct Circle {
 // px of the picture; px of the frame that it shows.
 Circle on_the_map(Circle circle, const ScaledPicture& at);
 Circle in_the_frame(Circle circle, const ScaledPicture& at);
+// Their centres, px of a frame that is reduced by averaging (frames/smooth_field.hpp).
+Places places_of(const std::vector<Circle>& circles, int reduction = 1);
 
 // Ratio of the axes of the stretched copies that tell what chance makes up: no bead's rim is round any more, textures
 // look much as before. At 1.4 a quarter of the white beads of a photograph (radius 7 px) still passed, at 1.8 a tenth.

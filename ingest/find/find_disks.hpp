@@ -126,6 +126,7 @@ struct CalibrationResult {
   bool found = false;
   FinderCalibration calibration;
   std::string why_not;
+  bool complete = false;  // by learn_finder() and learn_again(): beads and light explain the frame down to its noise
   std::shared_ptr<LearnedBeads> beads;  // for tell_radius()
   bool packed = false;  // a model of disks that touch describes the last frame: nothing among them is anything else
   std::optional<FindResult> in_last_frame;  // by learn_beads(), as far as it looked

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ingest/calibrate/picture_parts.hpp"
+#include "ingest/find/learn_from_part.hpp"
 #include "ingest/find/missed_beads.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/other_shade.hpp"
@@ -48,6 +49,7 @@ constexpr double whole_quality = 0.9;  // of a face that looks like all others: 
 struct MapsOfFrame {
   const GrayFrame& frame;
   PictureMaps quick{frame, quick_search.wanted_px}, thorough{frame, thorough_search.wanted_px};
+  Places beads{};  // that the quick search shows
 };
 
 // What a face is by its rim, or by that of its neighbours where it has none: blur, or a neighbour, hides the rims of
@@ -195,7 +197,7 @@ class FacesAndRims {
 
   // The calibration by faces, if faces and rims agree.
   std::optional<CalibrationResult> learn() {
-    CalibrationResult faces = learn_finder(frames_, asked_);
+    CalibrationResult faces = learn_finder_from_part(frames_, asked_, maps_.beads);
     for (int round = 0;; ++round) {
       faces.calibration.left_out = left_out_;
       const double ratio = faces.found ? faces.calibration.radius_px / rims_.model.radius_px : 0;
@@ -278,7 +280,7 @@ std::optional<CalibrationResult> learn_packed(const std::vector<const GrayFrame*
   find.polarity = options.seen->polarity;
   for (const double radius : radii_px) {
     find.radius_px = radius;
-    if (auto packed = as_packed(learn_packed_bed(frames, find), maps, options)) return packed;
+    if (auto packed = as_packed(learn_packed_bed(frames, find, maps.beads), maps, options)) return packed;
   }
   return std::nullopt;
 }
@@ -482,6 +484,7 @@ CalibrationResult learn_beads(const std::vector<const GrayFrame*>& frames, const
   if (options.seen->no_faces && options.seen->thorough)
     return calibration_by_rims(maps, learn_thoroughly(maps, options.seen->radius_px, options), options);
   LearnedRims rims = learn_quickly(maps, options);
+  maps.beads = places_of(circles_of(rims.disks));
   if (options.quick_rims_only) return calibration_by_rims(maps, with_disks(maps.quick, std::move(rims)), options);
   FindOptions asked = options;
   asked.polarity = options.seen->polarity;

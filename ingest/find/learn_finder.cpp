@@ -86,7 +86,6 @@ struct Learned {
   bool one_sided = false;  // light from one side was allowed for
   bool background_corrected = false;
   double unexplained = 0;  // of the first frame, grey levels squared
-  bool complete = false;   // hardly more than its noise
   bool astray = false;     // the radius went as far from the estimate as it may
   // Where learning paused, since it cannot become complete any more: what goes on with it.
   std::shared_ptr<BeadLearner> paused;
@@ -432,7 +431,7 @@ class BeadLearner {
                                      " disks, so its radius is uncertain. Use more frames.");
     all_.unexplained = unexplained_of(*beads_->fits.front(), light_);
     all_.one_sided = profile_.asymmetry != nullptr;
-    all_.complete = spread < left_if_complete(noise);
+    result.complete = spread < left_if_complete(noise);
     result.found = true;
     return std::move(all_);
   }
@@ -541,7 +540,7 @@ class StartChooser {
     constexpr double as_good = 1.02;
     // Beads lit from one side must explain the frame completely, and so must what is learned again.
     Learned best = learned_by(first, allowed.one_sided ? LearnUntil::hopeless : LearnUntil::settled);
-    if (best.background_corrected && !best.complete) {
+    if (best.background_corrected && !best.result.complete) {
       allowed.corrected_background = false;
       Learned as_it_was = learned_by(learner_of(from, allowed), LearnUntil::settled);
       if (as_it_was.result.found && (!best.result.found || as_it_was.unexplained < best.unexplained))
@@ -552,7 +551,7 @@ class StartChooser {
     for (int start = 1; start < most_starts && best.result.found && best.astray; ++start) {
       from.radius_px = best.result.calibration.rim_radius_px;
       Learned again = learned_by(learner_of(from, allowed), LearnUntil::hopeless);
-      if (!again.result.found || !again.complete) break;
+      if (!again.result.found || !again.result.complete) break;
       finish(best);
       if (again.unexplained > as_good * best.unexplained) break;
       best = std::move(again);
@@ -564,7 +563,7 @@ class StartChooser {
   [[nodiscard]] Learned learn(const Start& from) const {
     const Learner first = learner_of(from, {});
     Learned best = learn(first, from, {});
-    if (!best.one_sided || (best.complete && !best.astray)) return best;
+    if (!best.one_sided || (best.result.complete && !best.astray)) return best;
     const Allowed plainly{.one_sided = false};
     Learned plain = learn(first->plain() ? first->plain() : learner_of(from, plainly), from, plainly);
     if (plain.result.found) return plain;
@@ -578,7 +577,7 @@ class StartChooser {
     constexpr double clearly_less = 0.5, mostly_explained = 0.75;
     constexpr std::size_t fewest = 20;
     const bool seen = best.result.found;
-    if (options_.radius_px || (best.result.found && best.complete)) return best.result;
+    if (options_.radius_px || (best.result.found && best.result.complete)) return best.result;
     for (const auto& other : estimate_.others) {
       const bool known =
           estimate_.found && other.radius_px == estimate_.radius_px && other.polarity == estimate_.polarity;
@@ -586,8 +585,9 @@ class StartChooser {
       Learned another = learn(Start{other.radius_px, other.polarity});
       if (!another.result.found || another.typical < mostly_explained || another.result.calibration.disks_used < fewest)
         continue;
-      if (seen ? another.unexplained < clearly_less * best.unexplained : another.complete) best = std::move(another);
-      if (best.result.found && best.complete) break;
+      if (seen ? another.unexplained < clearly_less * best.unexplained : another.result.complete)
+        best = std::move(another);
+      if (best.result.found && best.result.complete) break;
     }
     return best.result;
   }
@@ -597,14 +597,14 @@ class StartChooser {
   [[nodiscard]] CalibrationResult packed_or_as_seen() const {
     const Start packed{estimate_.packed_radius_px, estimate_.packed_polarity};
     const auto convinces = [](const Learned& learned) {
-      return learned.result.found && learned.complete && fills(learned.result.calibration);
+      return learned.result.found && learned.result.complete && fills(learned.result.calibration);
     };
     if (estimate_.packed_likely) {
       Learned as_packed = learn(packed);
       return convinces(as_packed) ? as_packed.result : or_another(learn(as_seen()));
     }
     Learned seen = learn(as_seen());
-    if (seen.result.found && seen.complete) return seen.result;
+    if (seen.result.found && seen.result.complete) return seen.result;
     Learned as_packed = learn(packed);
     const bool better = !seen.result.found || as_packed.unexplained < seen.unexplained;
     return better && convinces(as_packed) ? as_packed.result : or_another(std::move(seen));

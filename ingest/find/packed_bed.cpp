@@ -8,6 +8,7 @@
 #include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/learn_beads.hpp"
+#include "ingest/find/learn_from_part.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/frames/smooth_field.hpp"
 
@@ -141,8 +142,9 @@ PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFra
   return bed;
 }
 
-PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options) {
-  CalibrationResult faces = learn_finder(frames, options);
+PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                           const Places& beads) {
+  CalibrationResult faces = learn_finder_from_part(frames, options, beads);
   if (faces.found) return packed_bed_of(std::move(faces), frames, options);
   PackedBed bed;
   bed.faces = std::move(faces);
@@ -205,7 +207,9 @@ std::optional<PackedBed> look_for_lit_bed(const GrayFrame& frame, const PackedSt
   find.polarity = start.polarity;
   find.radius_px = *start.radius_px / reduction;
   GrayFrame small = reduction > 1 ? reduced(frame, reduction) : frame;
-  PackedBed bed = learn_packed_bed({&small}, find);
+  Places places = start.lit;
+  for (auto& [x, y] : places) x = (x + 0.5) / reduction - 0.5, y = (y + 0.5) / reduction - 0.5;
+  PackedBed bed = learn_packed_bed({&small}, find, places);
   if (!bed.faces.found || bed.faces.calibration.radius_px < smallest_px) return std::nullopt;
   bed.reduction = reduction;
   bed.reduced_frame = std::move(small);
@@ -219,7 +223,7 @@ std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::
   if (std::max(frame.width, frame.height) > part_px)
     part = cut_out(frame, busiest_part(frame, part_px, {.block = 16, .reach = 2, .stride = 2}));
   for (const PackedStart& start : starts) {
-    if (start.lit) {
+    if (!start.lit.empty()) {
       if (auto bed = look_for_lit_bed(frame, start)) return bed;
       continue;
     }

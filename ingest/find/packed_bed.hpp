@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "ingest/calibrate/picture_parts.hpp"
 #include "ingest/find/find_disks.hpp"
 #include "ingest/find/rim_finder.hpp"
 
@@ -45,8 +46,9 @@ struct PackedBed {
 PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFrame*>& frames,
                         const FindOptions& options);
 
-// From the radius in `options`, or with nothing to start from.
-PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options);
+// From the radius in `options`, or with nothing to start from. `beads`: as in learn_finder_from_part().
+PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
+                           const Places& beads = {});
 
 // What rims of such beads would be like, for those who ask how many beads are missed.
 RimModel rims_of(const FinderCalibration& faces);
@@ -66,8 +68,8 @@ inline constexpr double largest_packed_px = 14;
 struct PackedStart {
   Polarity polarity = Polarity::automatic;
   std::optional<double> radius_px;
-  // Circles are seen of which one side is missing: beads of any size, worth a look at all of the picture.
-  bool lit = false;
+  // Centres of circles of which one side is missing: beads of any size, worth a look at all of the picture.
+  Places lit{};
 };
 // The first start that leads to small beads, or to lit ones. Of a large picture a part must convince before all of it
 // is looked at. Where beads are lit all of it is looked at: a part may show no background, whose level is then not

@@ -158,7 +158,7 @@ class ChannelTrials {
     const double radius = best.rims.radius_px / frames.reduction;
     factor_ = std::max(1, static_cast<int>(radius / trial_radius_px));
     const int all = factor_ * frames.reduction;
-    for (const RimDisk& disk : best.disks) places_.emplace_back(disk.circle.x / all, disk.circle.y / all);
+    places_ = places_of(circles_of(best.disks), all);
     const GrayFrame& frame = frames.channels.front().frame;
     part_ = part_with_most(places_, side_px, frame.width / factor_, frame.height / factor_);
     if (!options.roi) return;

@@ -299,8 +299,9 @@ std::vector<PackedStart> lit_starts(const Survey& survey, Channel channel, int r
   std::vector<PackedStart> starts;
   for (const SurveyCandidate& candidate : survey.candidates) {
     if (!candidate.plausible || candidate.why_not != one_side_missing || candidate.channel != channel) continue;
-    if (const auto radius = touching_radius(circles_of(candidate.disks)))
-      starts.push_back({candidate.rims.polarity, *radius / reduction, true});
+    const std::vector<Circle> circles = circles_of(candidate.disks);
+    if (const auto radius = touching_radius(circles))
+      starts.push_back({candidate.rims.polarity, *radius / reduction, places_of(circles, reduction)});
   }
   return starts;
 }
@@ -424,9 +425,7 @@ SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis
 std::optional<PicturePart> part_of(const GrayFrame& picture, const CircleHypothesis& hypothesis) {
   const int side = static_cast<int>(part_radii * hypothesis.radius_px);
   if (std::min(picture.width, picture.height) <= side) return std::nullopt;
-  std::vector<std::pair<double, double>> places;
-  for (const Circle& circle : hypothesis.seen) places.emplace_back(circle.x, circle.y);
-  return part_with_most(places, side, picture.width, picture.height);
+  return part_with_most(places_of(hypothesis.seen), side, picture.width, picture.height);
 }
 
 // What a part shows where it is enough to refuse a hypothesis: chance, other edges and outlines are no better in the

@@ -372,6 +372,12 @@ GrayFrame read_frame(const fs::path& path, std::size_t page, const FrameSourceOp
   return grey_of_still(decode_picture(path, page, options), path.string(), options, rule);
 }
 
+int reduction_to(std::size_t most, std::size_t pixels) {
+  int reduction = 1;
+  while (pixels / static_cast<std::size_t>(reduction * reduction) > most) ++reduction;
+  return reduction;
+}
+
 ChannelFrames read_channels(const fs::path& path, std::size_t page, std::size_t most_pixels,
                             const FrameSourceOptions& options) {
   ChannelFrames frames;
@@ -379,8 +385,7 @@ ChannelFrames read_channels(const fs::path& path, std::size_t page, std::size_t 
   frames.width = picture.cols;
   frames.height = picture.rows;
   const double enlargement = smooth_repeated_pixels(picture);
-  while (picture.total() / static_cast<std::size_t>(frames.reduction * frames.reduction) > most_pixels)
-    ++frames.reduction;
+  frames.reduction = reduction_to(most_pixels, picture.total());
   picture = averaged(picture, frames.reduction);
   std::vector<Channel> wanted = {options.channel};
   if (options.channel == Channel::automatic && has_colour(picture))

@@ -72,6 +72,8 @@ struct FrameSourceOptions {
   // Pixels beyond which a picture is not decoded at all.
   std::size_t largest_decoded_pixels = 1'000'000'000;
   // Frames are averaged over squares of so many pixels; pixels left over at the right and at the bottom are dropped.
+  // The colours are averaged as far as read_channels() averages them, and the levels computed from them by the rest.
+  // Where that is no whole factor, the colours are averaged over the whole squares.
   int reduction = 1;
   // Leave out so many frames at the beginning of the stream, and keep every `stride`-th of the others, the first
   // included.
@@ -126,6 +128,11 @@ class FrameSource {
 // The page-th picture of an image file, or the page-th frame of a film. Throws InputError.
 GrayFrame read_frame(const std::filesystem::path& path, std::size_t page = 0, const FrameSourceOptions& options = {});
 
+// Pixels to which a picture is reduced before beads are searched in its channels.
+inline constexpr std::size_t surveyed_pixels = 6'000'000;
+// The side of the squares over which a picture of so many pixels is averaged, so that at most `most` are left.
+int reduction_to(std::size_t most, std::size_t pixels);
+
 // One frame in every channel it has: grey alone when it has no colour. Frames of more than `most_pixels` are reduced by
 // averaging over `reduction` x `reduction` pixels.
 struct ChannelFrames {
@@ -138,7 +145,7 @@ struct ChannelFrames {
   std::vector<One> channels;
 };
 ChannelFrames read_channels(const std::filesystem::path& path, std::size_t page = 0,
-                            std::size_t most_pixels = 6'000'000, const FrameSourceOptions& options = {});
+                            std::size_t most_pixels = surveyed_pixels, const FrameSourceOptions& options = {});
 
 // Writes 8-bit grey PNG, levels rounded to nearest and clamped to 0 .. 255, into a temporary file beside `path` that is
 // then renamed, so that a half-written PNG is never seen. `compression` 0 (fast) .. 9 (small). Throws InputError for an

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "ingest/frames/smooth_field.hpp"
+
 namespace shakebed::ingest {
 
 namespace {
@@ -221,15 +223,16 @@ bool has_colour(const cv::Mat& picture) {
   return cv::mean(mixed(colours, rule))[0] > faint * most;
 }
 
-GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
-  if (given.empty()) throw InputError(path, "no picture", "decoding gives no pixels", "save it again");
-  const auto reduction = static_cast<std::size_t>(options.reduction);
-  if (given.total() / (reduction * reduction) > options.largest_frame_pixels)
-    throw InputError(
-        path, "frame of " + std::to_string(given.cols) + " x " + std::to_string(given.rows) + " px is too large",
-        "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to limit the memory used",
-        "crop it or reduce it");
-  cv::Mat picture = of_usual_kind(averaged(given, options.reduction));
+namespace {
+
+// By which the colours of a picture are averaged, of a reduction in all: as a survey has done, so that its search
+// serves a run, too.
+int reduction_of_colours(const cv::Mat& picture, int reduction) {
+  const int surveyed = reduction_to(surveyed_pixels, picture.total());
+  return reduction % surveyed == 0 ? surveyed : reduction;
+}
+
+GrayFrame levels_of(cv::Mat picture, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
   GrayFrame frame;
   frame.width = picture.cols;
   frame.height = picture.rows;
@@ -254,6 +257,21 @@ GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSour
     copy_floats(picture, path, rule, frame);
   }
   return frame;
+}
+
+}  // namespace
+
+GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
+  if (given.empty()) throw InputError(path, "no picture", "decoding gives no pixels", "save it again");
+  const auto reduction = static_cast<std::size_t>(options.reduction);
+  if (given.total() / (reduction * reduction) > options.largest_frame_pixels)
+    throw InputError(
+        path, "frame of " + std::to_string(given.cols) + " x " + std::to_string(given.rows) + " px is too large",
+        "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to limit the memory used",
+        "crop it or reduce it");
+  const int of_colours = reduction_of_colours(given, options.reduction);
+  return reduced(levels_of(of_usual_kind(averaged(given, of_colours)), path, options, rule),
+                 options.reduction / of_colours);
 }
 
 }  // namespace shakebed::ingest

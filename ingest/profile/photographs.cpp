@@ -22,7 +22,6 @@ constexpr double enough_radius_px = 12, enough_for_rims_px = 24;
 // px: of wider beads in a smaller frame. Two coins of 340 px were searched for 33 s; the centre of a rim of 100 px is
 // known to far less than a hundredth of its radius.
 constexpr double wide_radius_px = 100;
-constexpr std::size_t most_surveyed_pixels = 6'000'000;
 constexpr double most_wrong = 0.2, most_missed = 0.4, share_worth_a_word = 0.02;  // shares that may be wrong, or missed
 constexpr double levels_16_bit = 65535.0 / 255.0;
 
@@ -198,7 +197,7 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
                                        const FrameSourceOptions& source) {
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
     try {
-      const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, most_surveyed_pixels, source);
+      const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, surveyed_pixels, source);
       FirstLook look{.path = pictures[k].path,
                      .width = frames.width,
                      .height = frames.height,
@@ -238,8 +237,7 @@ int reduction_for(int width, int height, double radius_px, bool by_rims) {
     return static_cast<int>(std::ceil(std::sqrt(pixels / static_cast<double>(most))));
   };
   int by = std::max(1, static_cast<int>(radius_px / (by_rims ? enough_for_rims_px : enough_radius_px)));
-  if (!by_rims)
-    by = std::max(by, std::min(static_cast<int>(radius_px / trial_radius_px), by_pixels(most_surveyed_pixels)));
+  if (!by_rims) by = std::max(by, std::min(static_cast<int>(radius_px / trial_radius_px), by_pixels(surveyed_pixels)));
   return std::max(by, by_pixels(most_pixels));
 }
 

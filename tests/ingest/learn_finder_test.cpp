@@ -6,6 +6,7 @@
 
 #include "ingest/find/bed_light.hpp"
 #include "ingest/find/find_disks.hpp"
+#include "ingest/find/learn_from_part.hpp"
 #include "tests/ingest/by_hand.hpp"
 
 namespace shakebed::ingest {
@@ -58,6 +59,48 @@ TEST(LearnFinder, HoldsARadiusIfAsked) {
   EXPECT_EQ(learn_finder({&frame}, options).calibration.rim_radius_px, 9.4);
 }
 
+// A frame of 1.01 million pixels, most of it background. From a radius that is 7 % too small, its beads are learned as
+// from the radius that a part of it shows; from one that is 3 % too small, from this one.
+TEST(LearnFinder, LooksAtAPartOfALargeFrameFirst) {
+  std::vector<RenderedDisk> disks;
+  Places beads;
+  for (int k = 0; k < 280; ++k) {
+    disks.push_back(
+        {40 + 24.0 * (k % 20) + 3 * test::scattered(k, 1), 40 + 24.0 * (k / 20) + 3 * test::scattered(1, k), 9, 0, 0});
+    beads.emplace_back(disks.back().x_px, disks.back().y_px);
+  }
+  const Camera look{
+      .width = 1250, .height = 810, .background_level = 150, .bead_level = 70, .blur_px = 0.8, .read_noise = 2};
+  const GrayFrame frame = render_frame(disks, look);
+  FindOptions options;
+  options.polarity = Polarity::dark_beads;
+  const auto radius_of = [](const CalibrationResult& learned) { return learned.calibration.rim_radius_px; };
+  const auto alone = [&](double start) {
+    options.radius_px = start;
+    return radius_of(learn_finder({&frame}, options));
+  };
+  const auto from_part = [&](double start, const Places& seen) {
+    options.radius_px = start;
+    return radius_of(learn_finder_from_part({&frame}, options, seen));
+  };
+  options.radius_px = 8.4;
+  const auto part = part_half_filled(beads, 336, 1250, 810);
+  ASSERT_TRUE(part);
+  const GrayFrame cut = cut_out(frame, *part);
+  const CalibrationResult there = learn_finder({&cut}, options);
+  ASSERT_TRUE(there.found && there.complete);
+  EXPECT_NEAR(radius_of(there), 9, 0.03);
+  const double plain = alone(8.4);
+  EXPECT_NEAR(plain, 9, 0.01);
+  EXPECT_EQ(from_part(8.4, beads), alone(radius_of(there)));
+  EXPECT_NE(from_part(8.4, beads), plain);
+  EXPECT_EQ(from_part(8.7, beads), alone(8.7));
+  EXPECT_EQ(from_part(8.4, Places(beads.begin(), beads.begin() + 29)), plain) << "too few";
+  const GrayFrame smaller = cut_out(frame, {0, 0, 1250, 799});
+  EXPECT_EQ(radius_of(learn_finder_from_part({&smaller}, options, beads)),
+            radius_of(learn_finder({&smaller}, options)));
+}
+
 // An even frame: nothing votes for beads. Where their radius and polarity are given, they are looked for all the same;
 // the radius is stated in pixels as recorded.
 TEST(LearnFinder, SaysWhatItExamined) {
@@ -85,6 +128,7 @@ TEST(LearnFinder, IsOfBeadsThatExplainTheirFrame) {
     options.radius_px = 9;
     const CalibrationResult learned = learn_finder({&frame}, options);
     EXPECT_EQ(learned.found, mottle < 0.3) << learned.why_not;
+    EXPECT_FALSE(learned.complete) << "more than noise is left";
     if (!learned.found) {
       EXPECT_TRUE(test::holds(learned.why_not, "px radius were examined, but they do not explain the frame"));
     }

@@ -186,6 +186,27 @@ TEST(GreyLevels, AreAveragedAndLimited) {
   EXPECT_FALSE(has_colour(cv::Mat(4, 4, CV_8U, cv::Scalar(200))));
 }
 
+// Columns are red and green by turns. Of up to six million pixels the saturation of each counts, of more that of two by
+// two: as in a survey, which looks at six million at most. By three they are averaged at once.
+TEST(GreyLevels, AverageColoursAsFarAsASurveyDoes) {
+  const auto striped = [](int width, int height) {
+    return colours_by(width, height, CV_8UC3, [](int column, int) {
+      return column % 2 == 0 ? std::array<double, 3>{0, 0, 240} : std::array<double, 3>{0, 240, 0};
+    });
+  };
+  EXPECT_EQ(grey_of(striped(40, 20), Channel::saturation, nullptr, 4).at(3, 2), 240);
+  const cv::Mat large = striped(3000, 2001);
+  const GrayFrame by_four = grey_of(large, Channel::saturation, nullptr, 4);
+  ASSERT_EQ(by_four.width, 750);
+  ASSERT_EQ(by_four.height, 500);
+  EXPECT_EQ(by_four.at(3, 2), 120);
+  EXPECT_EQ(grey_of(large, Channel::saturation, nullptr, 3).at(3, 2), 160);
+  EXPECT_EQ(reduction_to(6'000'000, 6'000'000), 1);
+  EXPECT_EQ(reduction_to(6'000'000, 6'000'001), 2);
+  EXPECT_EQ(reduction_to(6'000'000, 24'000'003), 2);
+  EXPECT_EQ(reduction_to(6'000'000, 24'000'004), 3);
+}
+
 // Pixels that stand there three times along both sides, and not along one alone.
 TEST(GreyLevels, RepeatedPixelsAreFoundAndSmoothed) {
   for (const double factor : {2.0, 3.0, 5.0}) {
