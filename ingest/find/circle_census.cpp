@@ -9,6 +9,7 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/picture_maps.hpp"
 #include "ingest/find/picture_scale.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
@@ -176,16 +177,21 @@ class Census {
  private:
   void search_level(std::size_t channel, const ScaledPicture& level, double range) {
     const EdgeMap edges = edges_of(level);
-    const EdgeMap one = edges_of_stretched(level.picture, decoy_stretch, 0, edges.threshold);
-    const EdgeMap other = edges_of_stretched(level.picture, decoy_stretch, std::numbers::pi / 4, edges.threshold);
+    std::array<EdgeMap, 2> of_copies;
+    for_each_piece(2, [&](std::size_t copy) {
+      const double angle = static_cast<double>(copy) * std::numbers::pi / 4;
+      of_copies[copy] = edges_of_stretched(level.picture, decoy_stretch, angle, edges.threshold);
+    });
     const RadiusRange range_of_radii = radii_at(level.scale, options_);
     const bool tiny = std::min(level.picture.width, level.picture.height) < room_for_two;
     for (const Polarity polarity : {Polarity::dark_beads, Polarity::bright_beads}) {
       if (options_.polarity != Polarity::automatic && options_.polarity != polarity) continue;
-      const auto circles = [&](const EdgeMap& map) {
-        return find_circles(map, {smallest_at_level, largest_at_level, polarity, faintest_census_support});
-      };
-      const Found found{circles(edges), {circles(one), circles(other)}};
+      Found found;
+      for_each_piece(1 + of_copies.size(), [&](std::size_t piece) {
+        (piece == 0 ? found.picture : found.copies[piece - 1]) =
+            find_circles(piece == 0 ? edges : of_copies[piece - 1],
+                         {smallest_at_level, largest_at_level, polarity, faintest_census_support});
+      });
       for (double radius = range_of_radii.from; radius < range_of_radii.to; radius *= 1.05) {
         double by_chance = 0;
         CircleHypothesis hypothesis = weigh(found, radius, range, tiny ? few_asked : least_asked, &by_chance);

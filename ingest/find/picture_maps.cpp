@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "ingest/find/circle_search.hpp"
+#include "ingest/frames/picture_threads.hpp"
 
 namespace shakebed::ingest {
 
@@ -33,9 +34,11 @@ std::vector<StretchedCopy> copies_of(const PictureMap& map) {
   std::vector<StretchedCopy> copies(large ? 1 : stretching_directions);
   const std::size_t bands = large ? bands_of_copy : 1;
   const auto row = [&](std::size_t band) { return static_cast<int>(static_cast<std::size_t>(height) * band / bands); };
-  for (std::size_t copy = 0; copy < copies.size(); ++copy)
-    for (std::size_t band = 0; band < bands; ++band)
-      copies[copy].push_back(band_of(map, copy_angle((copy + band) % stretching_directions), row(band), row(band + 1)));
+  for (StretchedCopy& copy : copies) copy.resize(bands);
+  for_each_piece(copies.size() * bands, [&](std::size_t piece) {
+    const std::size_t copy = piece / bands, band = piece % bands;
+    copies[copy][band] = band_of(map, copy_angle((copy + band) % stretching_directions), row(band), row(band + 1));
+  });
   return copies;
 }
 
@@ -43,6 +46,13 @@ std::vector<StretchedCopy> copies_of(const PictureMap& map) {
 
 double copy_angle(std::size_t copy) {
   return static_cast<double>(copy) * std::numbers::pi / static_cast<double>(stretching_directions);
+}
+
+std::vector<const StretchedBand*> bands_of(const std::vector<StretchedCopy>& copies) {
+  std::vector<const StretchedBand*> bands;
+  for (const StretchedCopy& copy : copies)
+    for (const StretchedBand& band : copy) bands.push_back(&band);
+  return bands;
 }
 
 EdgeMap edges_of(const ScaledPicture& at, float threshold) {

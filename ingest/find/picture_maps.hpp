@@ -31,6 +31,9 @@ struct PictureMap {
 inline constexpr std::size_t stretching_directions = 4;
 double copy_angle(std::size_t copy);
 
+// Of all bands of all copies.
+std::vector<const StretchedBand*> bands_of(const std::vector<StretchedCopy>& copies);
+
 // Of a map of so many pixels there are four copies, one in each direction. Of a larger one, which shows many more
 // circles, there is one: bands in all four directions by turns.
 inline constexpr std::size_t copied_in_bands_px = 2'000'000;

@@ -13,6 +13,7 @@
 #include "ingest/find/rim_gaps.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/rim_shape.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
@@ -157,6 +158,7 @@ LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known)
   RimModel& model = learned.model;
   model = start;
   const auto& [at, edges, copies] = maps.with_copies(model.radius_px);
+  const std::vector<const StretchedBand*> bands = bands_of(copies);
   model.threshold = edges.threshold;
   std::vector<Circle> circles;
   // Until the radius settles: with beads of several sizes it starts between two of them.
@@ -167,12 +169,19 @@ LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known)
        round < fewest_rounds || (round < most_rounds && std::abs(model.radius_px / at.scale / radius - 1) > settled);
        ++round) {
     radius = model.radius_px / at.scale;
-    circles = circles_of(edges, radius, model);
+    std::vector<std::vector<Circle>> in_bands(bands.size());
+    for_each_piece(1 + bands.size(), [&](std::size_t piece) {
+      if (piece == 0)
+        circles = circles_of(edges, radius, model);
+      else
+        in_bands[piece - 1] = circles_of(bands[piece - 1]->edges, radius, model);
+    });
     std::vector<std::vector<Circle>> by_chance;
+    std::size_t which = 0;
     for (const StretchedCopy& copy : copies) {
       by_chance.emplace_back();
       for (const StretchedBand& band : copy)
-        for (const Circle& circle : circles_of(band.edges, radius, model))
+        for (const Circle& circle : in_bands[which++])
           if (band.holds(circle.y)) by_chance.back().push_back(circle);
     }
     model.probability = probabilities_by_support(circles, by_chance, known);

@@ -11,6 +11,7 @@
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/rim_shape.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "statistics/ranks.hpp"
 
@@ -235,6 +236,16 @@ GapMap map_of(const PictureMap& map) {
           nullptr};
 }
 
+GapMap map_of(const PictureMap& map, const StretchedBand& rows) {
+  return {rows.edges, map.at.scale,
+          [&map, &rows](double x, double y) {
+            const auto [u, v] =
+                place_before_stretching(map.at.picture, decoy_stretch, rows.angle, x, y + rows.first_row);
+            return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
+          },
+          &rows};
+}
+
 // A search in the picture and the same in its copies.
 struct WithCopies {
   GapSearch picture;
@@ -265,19 +276,26 @@ struct WithCopies {
 
  private:
   WithCopies(const PictureMap& map, const SizeBand& band, const RimModel& model, const std::vector<Circle>& beads)
-      : picture(map_of(map), band, model, beads) {
+      : WithCopies(map, searches_of(map, band, model, beads)) {}
+
+  // The first of the searches is that of the picture, the others are those of the bands.
+  WithCopies(const PictureMap& map, std::vector<std::optional<GapSearch>> searches)
+      : picture(std::move(*searches.front())) {
+    std::size_t which = 1;
     for (const StretchedCopy& copy : map.copies) {
       copies.emplace_back();
-      for (const StretchedBand& rows : copy)
-        copies.back().emplace_back(GapMap{rows.edges, map.at.scale,
-                                          [&map, &rows](double x, double y) {
-                                            const auto [u, v] = place_before_stretching(
-                                                map.at.picture, decoy_stretch, rows.angle, x, y + rows.first_row);
-                                            return FramePlace{map.at.to_frame_x(u), map.at.to_frame_y(v)};
-                                          },
-                                          &rows},
-                                   band, model, beads);
+      for (std::size_t band = 0; band < copy.size(); ++band) copies.back().push_back(std::move(*searches[which++]));
     }
+  }
+
+  static std::vector<std::optional<GapSearch>> searches_of(const PictureMap& map, const SizeBand& band,
+                                                           const RimModel& model, const std::vector<Circle>& beads) {
+    const std::vector<const StretchedBand*> bands = bands_of(map.copies);
+    std::vector<std::optional<GapSearch>> searches(1 + bands.size());
+    for_each_piece(searches.size(), [&](std::size_t piece) {
+      searches[piece].emplace(piece == 0 ? map_of(map) : map_of(map, *bands[piece - 1]), band, model, beads);
+    });
+    return searches;
   }
 };
 

@@ -13,6 +13,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "ingest/frames/smooth_field.hpp"
 #include "statistics/ranks.hpp"
 
@@ -386,9 +387,14 @@ std::vector<OtherChannel> others_worth_a_trial(const ChannelFrames& frames, cons
     others.push_back({one.channel, &one.frame, *polarity, {}});
   }
   if (here.plain() || others.empty()) return others;
-  for (OtherChannel& other : others) other.rims = rims_seen(trials, *other.frame, other.polarity, of_both);
+  RimsSeen rims;
+  for_each_piece(1 + others.size(), [&](std::size_t k) {
+    if (k == others.size())
+      rims = rims_seen(trials, first, best.rims.polarity, of_both);
+    else
+      others[k].rims = rims_seen(trials, *others[k].frame, others[k].polarity, of_both);
+  });
   if (others.size() > most_channels) keep_most_telling(others);
-  const RimsSeen rims = rims_seen(trials, first, best.rims.polarity, of_both);
   for (OtherChannel& other : others) other.shows_more = other.rims.of_both_signs > clearly_more * rims.of_both_signs;
   // All faces are found here, and look small: they do so there if their rims do.
   if (!here.by_rims && here.complete()) std::erase_if(others, [](const OtherChannel& one) { return !one.shows_more; });
@@ -409,13 +415,20 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   settled.thorough = most.thorough;
   settled.searched = most.searched;
   const bool plain = most.plain();
-  for (OtherChannel& other : others_worth_a_trial(frames, first->frame, best, options, most)) {
+  std::vector<OtherChannel> others = others_worth_a_trial(frames, first->frame, best, options, most);
+  const auto tried_in = [&](const OtherChannel& other) {
+    return trials.trial_in(*other.frame, other.polarity, Shades::all, !other.shows_more);
+  };
+  std::vector<Trial> of_others(others.size());
+  if (!plain) for_each_piece(others.size(), [&](std::size_t k) { of_others[k] = tried_in(others[k]); });
+  for (std::size_t k = 0; k < others.size(); ++k) {
+    OtherChannel& other = others[k];
     if (plain && trials.alike(first->frame, *other.frame)) continue;
     const double missing = (clearly_more - 1) * most.expected;
     if (plain && trials.rims_beside(most.disks, *other.frame, options.polarity, missing) <= missing) continue;
     if (plain && options.polarity == Polarity::automatic)
       other.polarity = trials.polarity_of_radius(*other.frame, other.polarity, most.radius_px);
-    Trial there = trials.trial_in(*other.frame, other.polarity, Shades::all, !other.shows_more);
+    Trial there = plain ? tried_in(other) : std::move(of_others[k]);
     if (!better_there(most, there)) continue;
     settled.channel = other.channel;
     settled.rims.polarity = other.polarity;

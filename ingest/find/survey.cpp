@@ -17,6 +17,7 @@
 #include "ingest/find/picture_maps.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/settle_channel.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "statistics/text.hpp"
 
 namespace shakebed::ingest {
@@ -574,8 +575,9 @@ CircleCensus examine_channels(const SearchedChannels& in, const CensusOptions& o
   if (first_alone || may_show_beads_plainly(census)) examine(census, in, asked, most, survey);
   if (first_alone || shows_beads_plainly(survey)) return census;
   survey.candidates.clear();
-  for (std::size_t channel = 1; channel < in.pictures.size(); ++channel)
-    add_census(census_of(*in.pictures[channel], channel, options), census);
+  std::vector<CircleCensus> others(in.pictures.size() - 1);
+  for_each_piece(others.size(), [&](std::size_t k) { others[k] = census_of(*in.pictures[k + 1], k + 1, options); });
+  for (const CircleCensus& other : others) add_census(other, census);
   examine(census, in, asked, most, survey);
   return census;
 }

@@ -12,6 +12,7 @@
 #include "ingest/find/rim_finder.hpp"
 #include "ingest/find/survey.hpp"
 #include "ingest/find/two_kinds.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "ingest/profile/photographs.hpp"
 
 namespace shakebed::ingest {
@@ -158,6 +159,7 @@ class FilmLearner {
     enlargement_ = std::max(enlargement_, frame.enlargement);
     straight_.push_back(straightened(frame));
     recorded_.push_back(std::move(frame));
+    const PictureThreads threads(threads_for(recorded_.back().width, recorded_.back().height));
     CalibrationResult attempt = calibrated_.found ? learn_beads(pointers_to(straight_), find_) : learned_from_one();
     if (!attempt.found) {
       if (first_reason.empty()) first_reason = attempt.why_not;

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "ingest/frames/picture_threads.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/bed_geometry.hpp"
@@ -56,6 +57,7 @@ class OrderedFrames {
     const std::function<void()> question = StopQuestion::of_thread();
     for_each_index(threads, static_cast<int>(threads), [&](std::size_t) {
       const StopQuestion asked(question);
+      const PictureThreads alone(1);  // of each frame
       work(take_up);
     });
     if (failure_) std::rethrow_exception(failure_);

@@ -8,6 +8,7 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
+#include "ingest/frames/picture_threads.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/candidate_picture.hpp"
 #include "statistics/text.hpp"
@@ -198,6 +199,7 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
     try {
       const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, surveyed_pixels, source);
+      const PictureThreads threads(threads_for(frames.width, frames.height));
       FirstLook look{.path = pictures[k].path,
                      .width = frames.width,
                      .height = frames.height,
@@ -321,6 +323,7 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
   if (const auto problems = options.validate(); !problems.empty())
     return refused(FindStatus::bad_input, problems.front());
   MeasureOptions measure = options;
+  const PictureThreads threads(static_cast<int>(measure.threads));
   FrameSourceOptions source = source_options;
   std::string reduced_why;
   std::optional<PixelRectangle> region;

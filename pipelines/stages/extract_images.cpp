@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "ingest/frames/picture_threads.hpp"
 #include "ingest/frames/png_text.hpp"
 #include "ingest/frames/stop_question.hpp"
 #include "ingest/profile/bed_doubts.hpp"
@@ -144,6 +145,7 @@ class Extraction {
       context_.progress(done > 0 ? time_.fraction() : 0, done > 0 ? "finding disks" : "searching for beads");
     });
     measure_.threads = static_cast<unsigned>(context_.jobs());
+    const ingest::PictureThreads threads(context_.jobs());
     film_.source.skip = options_.skip, film_.source.stride = options_.stride;
     film_.source.channel = channel_of(options_.channel);
     if (rendered_ != nullptr) {
