@@ -1,5 +1,6 @@
 #include "statistics/parallel.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <exception>
 #include <mutex>
@@ -7,6 +8,8 @@
 #include <vector>
 
 namespace shakebed {
+
+int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
 void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
   std::atomic<std::size_t> next{0};

@@ -11,4 +11,7 @@ namespace shakebed {
 // thrown here.
 void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
 
+// Of this machine; at least 1, also where their number is not known.
+int processors();
+
 }  // namespace shakebed

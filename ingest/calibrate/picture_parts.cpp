@@ -116,10 +116,8 @@ std::vector<CountedPart> counted_parts(const Places& places, int side, int width
   for (int top = 0; top < height - one.part.height + step; top += step)
     for (int left = 0; left < width - one.part.width + step; left += step) {
       one.part.left = std::min(left, width - one.part.width), one.part.top = std::min(top, height - one.part.height);
-      one.places = std::count_if(places.begin(), places.end(), [&](const auto& place) {
-        const double column = place.first - one.part.left, row = place.second - one.part.top;
-        return column >= 0 && row >= 0 && column < one.part.width && row < one.part.height;
-      });
+      one.places = std::count_if(places.begin(), places.end(),
+                                 [&](const auto& place) { return one.part.holds(place.first, place.second); });
       parts.push_back(one);
     }
   return parts;

@@ -15,6 +15,9 @@ GrayFrame halved(const GrayFrame& frame);
 // A part of `width` x `height` px whose first pixel is at (left, top).
 struct PicturePart {
   int left = 0, top = 0, width = 0, height = 0;
+  [[nodiscard]] bool holds(double x, double y) const {
+    return x >= left && y >= top && x < left + width && y < top + height;
+  }
 };
 GrayFrame cut_out(const GrayFrame& frame, const PicturePart& part);
 

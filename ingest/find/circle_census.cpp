@@ -178,7 +178,7 @@ class Census {
   void search_level(std::size_t channel, const ScaledPicture& level, double range) {
     const EdgeMap edges = edges_of(level);
     std::array<EdgeMap, 2> of_copies;
-    for_each_piece(2, [&](std::size_t copy) {
+    for_each_piece(of_copies.size(), [&](std::size_t copy) {
       const double angle = static_cast<double>(copy) * std::numbers::pi / 4;
       of_copies[copy] = edges_of_stretched(level.picture, decoy_stretch, angle, edges.threshold);
     });

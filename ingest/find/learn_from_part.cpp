@@ -20,10 +20,8 @@ std::optional<PicturePart> part_of(const GrayFrame& frame, double radius_px, con
   if (static_cast<double>(frame.pixels.size()) < std::max(large_px, much_larger * side * side)) return std::nullopt;
   const PicturePart part = part_half_filled(beads, side, frame.width, frame.height)
                                .value_or(part_with_most(beads, side, frame.width, frame.height));
-  const auto in_part = std::count_if(beads.begin(), beads.end(), [&](const auto& bead) {
-    return bead.first >= part.left && bead.second >= part.top && bead.first < part.left + part.width &&
-           bead.second < part.top + part.height;
-  });
+  const auto in_part =
+      std::count_if(beads.begin(), beads.end(), [&](const auto& bead) { return part.holds(bead.first, bead.second); });
   return in_part < fewest_learned_from ? std::nullopt : std::optional(part);
 }
 

@@ -419,7 +419,7 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   const auto tried_in = [&](const OtherChannel& other) {
     return trials.trial_in(*other.frame, other.polarity, Shades::all, !other.shows_more);
   };
-  std::vector<Trial> of_others(others.size());
+  std::vector<Trial> of_others(others.size());  // unless this channel is plain: hardly another is tried then
   if (!plain) for_each_piece(others.size(), [&](std::size_t k) { of_others[k] = tried_in(others[k]); });
   for (std::size_t k = 0; k < others.size(); ++k) {
     OtherChannel& other = others[k];

@@ -435,10 +435,8 @@ std::optional<SurveyCandidate> refused_by_part(const GrayFrame& picture, const C
                                                const SurveyAsked& asked) {
   const std::optional<PicturePart> part = part_of(picture, hypothesis);
   if (!part) return std::nullopt;
-  const auto seen = std::count_if(hypothesis.seen.begin(), hypothesis.seen.end(), [&](const Circle& circle) {
-    return circle.x >= part->left && circle.y >= part->top && circle.x < part->left + part->width &&
-           circle.y < part->top + part->height;
-  });
+  const auto seen = std::count_if(hypothesis.seen.begin(), hypothesis.seen.end(),
+                                  [&](const Circle& circle) { return part->holds(circle.x, circle.y); });
   if (seen < fewest_in_part) return std::nullopt;
   const GrayFrame cut = cut_out(picture, *part);
   ExaminedPicture alone(cut);

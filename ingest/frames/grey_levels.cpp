@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "ingest/frames/smooth_field.hpp"
@@ -270,8 +271,9 @@ GrayFrame to_gray(const cv::Mat& given, const std::string& path, const FrameSour
         "more than " + std::to_string(options.largest_frame_pixels) + " pixels are refused to limit the memory used",
         "crop it or reduce it");
   const int of_colours = reduction_of_colours(given, options.reduction);
-  return reduced(levels_of(of_usual_kind(averaged(given, of_colours)), path, options, rule),
-                 options.reduction / of_colours);
+  GrayFrame frame = levels_of(of_usual_kind(averaged(given, of_colours)), path, options, rule);
+  const int of_levels = options.reduction / of_colours;
+  return of_levels > 1 ? reduced(frame, of_levels) : std::move(frame);
 }
 
 }  // namespace shakebed::ingest

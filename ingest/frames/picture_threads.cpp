@@ -8,12 +8,12 @@
 namespace shakebed::ingest {
 
 namespace {
-thread_local int allowed = 1;
+thread_local int threads_allowed = 1;
 }
 
-PictureThreads::PictureThreads(int threads) : outer_(std::exchange(allowed, threads)) {}
-PictureThreads::~PictureThreads() { allowed = outer_; }
-int PictureThreads::of_thread() { return allowed; }
+PictureThreads::PictureThreads(int threads) : outer_(std::exchange(threads_allowed, threads)) {}
+PictureThreads::~PictureThreads() { threads_allowed = outer_; }
+int PictureThreads::of_thread() { return threads_allowed; }
 
 int threads_for(int width, int height) {
   constexpr double large_px = 1e6;
@@ -22,7 +22,7 @@ int threads_for(int width, int height) {
 
 void for_each_piece(std::size_t count, const std::function<void(std::size_t)>& work) {
   const std::function<void()> question = StopQuestion::of_thread();
-  for_each_index(count, allowed, [&](std::size_t i) {
+  for_each_index(count, threads_allowed, [&](std::size_t i) {
     const PictureThreads alone(1);
     const StopQuestion asked(question);
     work(i);

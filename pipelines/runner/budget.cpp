@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "fit/profile_fit/chances.hpp"
@@ -17,6 +16,7 @@
 #include "pipelines/runner/folder_lock.hpp"
 #include "pipelines/stages/replica_seed.hpp"
 #include "pipelines/stages/replicas.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 
@@ -261,9 +261,7 @@ Refinement judged(const EffortReading& coarse, const EffortReading& fine, const 
 
 namespace {
 
-int threads_of(const RunOptions& options) {
-  return options.jobs > 0 ? options.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
+int threads_of(const RunOptions& options) { return options.jobs > 0 ? options.jobs : processors(); }
 
 std::string changes_text(const Scalable::Changes& changes) {
   std::vector<std::string> parts;

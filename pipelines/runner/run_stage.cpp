@@ -13,11 +13,11 @@
 #include <ctime>
 #include <mutex>
 #include <numeric>
-#include <thread>
 
 #include "pipelines/formats/files.hpp"
 #include "pipelines/runner/expected_time.hpp"
 #include "pipelines/runner/manifest.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 
@@ -56,8 +56,6 @@ void publish(const fs::path& finished, const fs::path& place) {
   }
   fs::rename(finished, place);
 }
-
-int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
 std::optional<Stamp> stamp_of(const fs::path& path) {
   const auto nanoseconds = [](const timespec& t) { return t.tv_sec * std::int64_t{1'000'000'000} + t.tv_nsec; };

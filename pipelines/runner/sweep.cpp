@@ -8,7 +8,6 @@
 #include <chrono>
 #include <map>
 #include <mutex>
-#include <thread>
 
 #include "pipelines/formats/csv.hpp"
 #include "pipelines/formats/files.hpp"
@@ -177,8 +176,7 @@ class SweepRun {
           missing == 0 ? "" : fmt::format(". Run the same command without --gather to compute the other {}", missing)));
       return;
     }
-    const int workers =
-        std::max(1, options_.jobs > 0 ? options_.jobs : static_cast<int>(std::thread::hardware_concurrency()));
+    const int workers = options_.jobs > 0 ? options_.jobs : processors();
     to_run_ = mine_.size() - kept_;
     console_.message(
         fmt::format("{} points, {} up to date, {} to run on {} threads", mine_.size(), kept_, to_run_, workers));

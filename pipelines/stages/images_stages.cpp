@@ -3,11 +3,9 @@
 // implements: pipelines/stages/images_module.hpp
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
-#include <thread>
 
 #include "ingest/frames/picture_threads.hpp"
 #include "pipelines/stages/extract_images.hpp"
@@ -15,12 +13,13 @@
 #include "pipelines/stages/proposals.hpp"
 #include "pipelines/stages/render_images.hpp"
 #include "pipelines/version.hpp"
+#include "statistics/parallel.hpp"
 
 namespace shakebed::pipelines {
 namespace {
 
 Previewed preview_images(const PreviewRequest& request) {
-  const ingest::PictureThreads threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  const ingest::PictureThreads threads(processors());
   ingest::FrameSourceOptions kept;
   kept.skip = request.options.skip, kept.stride = request.options.stride;
   const std::vector<ingest::FrameOrigin> pictures = first_pictures(request.files, kept);
