@@ -99,7 +99,7 @@ Answer dry_run(const Plan& plan, const RunOptions& options) {
   return {exit_ok, explanation_text(stages) + facts_text(plan), explanation_json(plan, stages)};
 }
 
-Answer real_run(const Plan& plan, const RunOptions& options, Console& console) {
+Answer real_run(const Plan& plan, const RunOptions& options, bool json, Console& console) {
   install_interrupt_handler();
   const RunOutcome outcome = run_pipeline(plan, options, report_pages(), console);
   const bool ended = outcome.code == exit_ok || outcome.code == exit_check_failed;
@@ -109,7 +109,7 @@ Answer real_run(const Plan& plan, const RunOptions& options, Console& console) {
   return {outcome.code,
           terminal_text(plan, outcome) + fmt::format("{} {}\nreport:  {}\n", ended ? "results:" : "results so far:",
                                                      outcome.out.string(), (outcome.out / "report.html").string()),
-          outcome_json(plan, outcome)};
+          json ? outcome_json(plan, outcome) : Json()};
 }
 
 Answer sweep(const Call& call, const RunArguments& run, const Plan& plan, const RunOptions& options, Console& console) {
@@ -195,7 +195,7 @@ int run_plan_command(const Call& call, const RunArguments& run, const Plan& give
   const Plan& plan = budgeted ? budgeted->plan : given;
   Answer answer = plan.sweep    ? sweep(call, run, plan, options, console)
                   : run.dry_run ? dry_run(plan, options)
-                                : real_run(plan, options, console);
+                                : real_run(plan, options, call.json, console);
   if (!call.json)
     print(answer.text);
   else if (result != nullptr)

@@ -2,6 +2,7 @@
 // Reading: nlohmann's parser gives the events, the bytes it has consumed give their places.
 #include <fmt/format.h>
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -277,7 +278,10 @@ std::string read_text(const std::filesystem::path& path) {
     throw InputError(path.string() + ": this is a directory; give a file");
   std::ifstream stream(path, std::ios::binary);
   if (!stream) fail_to_read(path.string());
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::string text;
+  for (std::array<char, 1 << 16> part; stream.read(part.data(), part.size()) || stream.gcount() > 0;)
+    text.append(part.data(), static_cast<std::size_t>(stream.gcount()));
+  return text;
 }
 }  // namespace
 

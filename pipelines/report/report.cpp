@@ -450,10 +450,8 @@ class Report {
   int pictures_ = 0;
 };
 
-std::string report_html(const Plan& plan, const RunOutcome& outcome) { return Report(plan, outcome).page(); }
-
-std::string published_text(const Plan& plan, const RunOutcome& outcome) {
-  const auto rows = Report(plan, outcome).published_rows();
+std::string published_text(const Report& report) {
+  const auto rows = report.published_rows();
   if (rows.empty()) return "";
   std::size_t widest = 6;
   for (const auto& row : rows) widest = std::max(widest, row.label.size());
@@ -470,7 +468,7 @@ std::string published_text(const Plan& plan, const RunOutcome& outcome) {
   return out;
 }
 
-std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
+std::string summary_markdown(const Plan& plan, const RunOutcome& outcome, const Report& report) {
   const std::string title = plan.report.title.empty() ? plan.name : plan.report.title;
   std::string out = fmt::format("# {}\n\n**{}**\n\n", markdown(title),
                                 outcome.code == exit_ok             ? "Finished"
@@ -478,7 +476,6 @@ std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
                                 : outcome.code == exit_interrupted  ? "Interrupted"
                                                                     : "Stopped");
   if (!outcome.error.empty()) out += fmt::format("> {}\n\n", markdown(outcome.error));
-  const Report report(plan, outcome);
   out += report.markdown_of_stages();
   if (const auto rows = report.published_rows(); !rows.empty()) {
     out += "\n## Comparison with published numbers\n\n| number | ours | published | verdict |\n|---|---|---|---|\n";
@@ -504,8 +501,9 @@ std::string summary_markdown(const Plan& plan, const RunOutcome& outcome) {
 class ReportPages : public Pages {
  public:
   void write(const Plan& plan, const RunOutcome& outcome) const override {
-    write_file_atomically(outcome.out / "report.html", report_html(plan, outcome));
-    write_file_atomically(outcome.out / "summary.md", summary_markdown(plan, outcome));
+    Report report(plan, outcome);
+    write_file_atomically(outcome.out / "report.html", report.page());
+    write_file_atomically(outcome.out / "summary.md", summary_markdown(plan, outcome, report));
     write_file_atomically(outcome.out / crate_name, dump(crate_json(plan, outcome)));
   }
   void write(const Plan& plan, const SweepOutcome& outcome) const override { write_sweep_pages(plan, outcome); }
@@ -514,8 +512,9 @@ class ReportPages : public Pages {
 }  // namespace
 
 std::string terminal_text(const Plan& plan, const RunOutcome& outcome) {
-  const std::string published = published_text(plan, outcome);
-  return published.empty() ? Report(plan, outcome).terminal_lines() : "\n" + published + "\n";
+  const Report report(plan, outcome);
+  const std::string published = published_text(report);
+  return published.empty() ? report.terminal_lines() : "\n" + published + "\n";
 }
 
 const Pages& report_pages() {

@@ -2,7 +2,6 @@
 // the warnings; the bed and its film. Then: the figures; the numbers beside the published ones; the assumptions; the
 // stages with their times; the sources. The pages of a stage are the stage's own (StagePages).
 //
-// What depends on the machine stands between <!-- times --> and <!-- /times -->, here and in summary.md: without these
 // What depends on the machine stands between <!-- times --> and <!-- /times -->, here and in summary.md. Without these
 // blocks the pages of two runs with the same seeds are equal byte for byte.
 #pragma once

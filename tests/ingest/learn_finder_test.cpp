@@ -92,8 +92,9 @@ TEST(LearnFinder, LooksAtAPartOfALargeFrameFirst) {
   EXPECT_NEAR(radius_of(there), 9, 0.03);
   const double plain = alone(8.4);
   EXPECT_NEAR(plain, 9, 0.01);
-  EXPECT_EQ(from_part(8.4, beads), alone(radius_of(there)));
-  EXPECT_NE(from_part(8.4, beads), plain);
+  const double by_part = from_part(8.4, beads);
+  EXPECT_EQ(by_part, alone(radius_of(there)));
+  EXPECT_NE(by_part, plain);
   EXPECT_EQ(from_part(8.7, beads), alone(8.7));
   EXPECT_EQ(from_part(8.4, Places(beads.begin(), beads.begin() + 29)), plain) << "too few";
   const GrayFrame smaller = cut_out(frame, {0, 0, 1250, 799});

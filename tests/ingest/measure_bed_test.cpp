@@ -501,14 +501,14 @@ TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
   options.disk_sink = nullptr;
 
   options.shaking_frequency_hz = 21;
-  source.rewind();
-  const Measurement given = measure_bed(source, options);
+  FrameSource half = FrameSource::from_frames({frames.begin(), frames.begin() + 40});
+  const Measurement given = measure_bed(half, options);
   EXPECT_TRUE(given.calibration.frequency_given);
   EXPECT_EQ(given.calibration.shaking_frequency_hz, 21);
   EXPECT_TRUE(warned(given, "but 21 Hz was given"));
   options.shaking_frequency_hz = 20;
-  source.rewind();
-  EXPECT_FALSE(warned(measure_bed(source, options), "Hz was given"));
+  half.rewind();
+  EXPECT_FALSE(warned(measure_bed(half, options), "Hz was given"));
 
   options.shaking_frequency_hz.reset();
   FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 30, 1 / 13.7));
