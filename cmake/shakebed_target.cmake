@@ -84,8 +84,8 @@ endfunction()
 # shakebed_test(NAME SOURCES sources... LABELS labels... LIBRARIES libraries... [TIMEOUT seconds] [UNITY files]
 #               [OPTIMIZED] [BY_SUITE] [BY_HAND] [LONG patterns...] [LONG_COST seconds] [STUDY patterns...])
 # One GoogleTest program; each of its tests becomes a ctest case with the labels given. OPTIMIZED: the tests themselves
-# compute long. BY_SUITE: the tests of a suite are one ctest case, for programs that take long to start (OpenCV's
-# libraries take a quarter of a second); the suites in SMALL together are one more. LONG, STUDY: names of tests (* and ?
+# compute long. BY_SUITE: the tests of a suite are one ctest case, for programs of many brief tests or that take long to start
+# (OpenCV's libraries take a quarter of a second); the suites in SMALL together are one more. LONG, STUDY: names of tests (* and ?
 # as in --gtest_filter) that also get the label long or study. UNITY: how many files are compiled at once, if not as many as elsewhere.
 # LONG_COST: what a long one takes; ctest starts the dearest first. BY_HAND: the program has no quick tests, and is built
 # with the target by_hand, not with all.

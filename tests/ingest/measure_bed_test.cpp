@@ -25,7 +25,7 @@
 namespace shakebed::ingest {
 namespace {
 
-// 337 beads of 20 px: touching layers, gas above, shaded, blurred, noisy, moving while the shutter is open.
+// 223 beads of 20 px: touching layers, gas above, shaded, blurred, noisy, moving while the shutter is open.
 struct Film {
   std::vector<std::vector<RenderedDisk>> truth;
   std::vector<GrayFrame> frames;
@@ -35,7 +35,7 @@ Film film_of(std::size_t count) {
   static Film film;
   static RandomStream random(3);
   Camera camera;
-  camera.width = 640;
+  camera.width = 440;
   camera.height = 520;
   camera.shading = BeadShading::shaded;
   camera.blur_px = 0.8;
@@ -46,10 +46,10 @@ Film film_of(std::size_t count) {
   for (std::size_t k = film.frames.size(); k < count; ++k) {
     SyntheticBed bed;
     bed.left_wall_px = 20;
-    bed.right_wall_px = 620;
+    bed.right_wall_px = 420;
     bed.floor_px = 500;
     bed.rows = 8;
-    bed.gas_count = 101;
+    bed.gas_count = 67;
     bed.gas_height_px = 60;
     bed.jitter_px = 0.1;
     bed.seed = k + 1;
@@ -131,7 +131,7 @@ TEST(MeasureBed, DensityOfRenderedBedWithKnownGeometryIsTheTrueOne) {
   MeasureOptions options = options_of();
   options.floor_px = 500;
   options.left_wall_px = 20;
-  options.right_wall_px = 620;
+  options.right_wall_px = 420;
   options.scale_m_per_px = 2.99e-3 / 20;
   FrameSource source = FrameSource::from_frames(film.frames);
   const Measurement measured = measure_bed(source, options);
@@ -142,7 +142,7 @@ TEST(MeasureBed, DensityOfRenderedBedWithKnownGeometryIsTheTrueOne) {
     for (const RenderedDisk& disk : disks)
       if (disk.y_px >= -0.5) heights.push_back((500 - disk.y_px) / 20);
     in_view += heights.size();
-    densities.push_back(density_of_frame(heights, 30, measured.profile.bins, options.kernel));
+    densities.push_back(density_of_frame(heights, 20, measured.profile.bins, options.kernel));
   }
   EXPECT_EQ(measured.disks.size(), in_view);
   const DensityProfile truth = average_profile(densities, measured.profile.bins, options.kernel);
@@ -193,8 +193,8 @@ TEST(MeasureBed, GeometryIsFoundWhenNotGiven) {
   EXPECT_NEAR(bed.floor_px, 500, 0.1);
   EXPECT_NEAR(bed.floor_tilt_degrees, 0, 0.02);
   EXPECT_NEAR(bed.left_wall_px, 20, 0.2);
-  EXPECT_NEAR(bed.right_wall_px, 620, 0.2);
-  EXPECT_NEAR(bed.width, 30, 0.07);
+  EXPECT_NEAR(bed.right_wall_px, 420, 0.2);
+  EXPECT_NEAR(bed.width, 20, 0.047);
   EXPECT_EQ(bed.polarity, Polarity::dark_beads);
 }
 
@@ -511,7 +511,7 @@ TEST(MeasureBed, TheShakersFrequencyIsFoundUnlessGiven) {
   EXPECT_FALSE(warned(measure_bed(half, options), "Hz was given"));
 
   options.shaking_frequency_hz.reset();
-  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 30, 1 / 13.7));
+  FrameSource still = FrameSource::from_frames(shaken_film(0, 0, 15, 1 / 13.7));
   const Measurement resting = measure_bed(still, options);
   EXPECT_EQ(resting.calibration.shaking_frequency_hz, 0);
   EXPECT_FALSE(resting.calibration.why_no_frequency.empty());
@@ -639,7 +639,7 @@ TEST(MeasureBed, TablesAndOverlayAreWritten) {
   const FindResult found = find_disks(film.frames[0], measured.finder);
   write_overlay(folder / "overlay.png", film.frames[0], found.disks);
   const GrayFrame overlay = read_frame(folder / "overlay.png");
-  EXPECT_EQ(overlay.width, 1280);
+  EXPECT_EQ(overlay.width, 880);
 }
 
 // Eight frames of a flume, black beads of 6 mm, measured with nothing but the diameter. The truth says which beads rest
