@@ -280,8 +280,8 @@ TEST(Plates, GoOnFromACheckpointToTheSameBytes) {
     }
     b->restore(saved);
     expect_same_bytes(*a, *b);
-    a->advance_to(25);
-    b->advance_to(25);
+    a->advance_to(17);
+    b->advance_to(17);
     expect_same_bytes(*a, *b);
   }
 }
@@ -289,12 +289,12 @@ TEST(Plates, GoOnFromACheckpointToTheSameBytes) {
 TEST(Plates, DoNotCareWhenOneLooks) {
   for (const Scene& scene : scenes_between_plates()) {
     const auto a = simulate(scene), b = simulate(scene);
-    a->advance_to(20);
-    for (int i = 1; i <= 500; ++i) {
+    a->advance_to(10);
+    for (int i = 1; i <= 250; ++i) {
       b->advance_to(0.04 * i);
       snapshot_of(*b);
     }
-    b->advance_to(20);
+    b->advance_to(10);
     expect_same_bytes(*a, *b);
   }
 }

@@ -254,7 +254,7 @@ TEST(PressedRoughBed, OfTheEngineKeepsTheLedgerAndItsOverlaps) {
       SCOPED_TRACE(testing::Message() << gamma << " " << width);
       const auto bed = simulate(rough_scene(gamma, width, 0.6));
       double deepest = 0;
-      for (int k = 1; k <= 400; ++k) {
+      for (int k = 1; k <= 260; ++k) {
         bed->advance_to(0.062 * k);
         const EnergyLedger ledger = bed->energy();
         ASSERT_NEAR(ledger.imbalance(), 0, 1e-10 * (ledger.dissipated + ledger.initial));
@@ -294,7 +294,7 @@ TEST(PressedRoughBed, LandsHarderThanItLay) {
 TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
   int pressed = 0;
   for (const double gamma : {0.8, 1.3}) {
-    for (const double saved_at : {15.0, 30.0}) {
+    for (const double saved_at : {10.0, 20.0}) {
       const Scene scene = rough_scene(gamma, 12.3, 0.6);
       const auto a = simulate(scene);
       while (a->time() < saved_at) a->advance_to(a->next_synchronisation());
@@ -302,8 +302,8 @@ TEST(PressedRoughBed, GoesOnFromACheckpointToTheSameBytes) {
       b->restore(a->checkpoint());
       pressed += a->energy().compressed > 0;
       EXPECT_EQ(a->energy().compressed, b->energy().compressed);
-      a->advance_to(saved_at + 15);
-      b->advance_to(saved_at + 15);
+      a->advance_to(saved_at + 10);
+      b->advance_to(saved_at + 10);
       expect_same_bytes(*a, *b);
     }
   }
