@@ -148,7 +148,8 @@ class FrameDrawer {
     write_file(metadata_path(context_.output("truth.csv")), dump(head.metadata("truth.csv")));
   }
 
-  // Read in order, drawn on all threads, the truth written in order.
+  // Read in order, drawn on all threads, the truth written in order. After an interrupt, which the runner asks for
+  // where a stage ends, what is there remains incomplete.
   void draw_on_all_threads() {
     const ingest::FrameRenderer renderer(camera_);
     TrajectoryReader reader(trajectory_);
@@ -161,7 +162,6 @@ class FrameDrawer {
         throw;
       }
     });
-    context_.check_interrupted();
   }
 
   void draw_frames(TrajectoryReader& reader, const ingest::FrameRenderer& renderer) {

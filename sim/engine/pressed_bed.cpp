@@ -461,7 +461,7 @@ auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, Wall wa
     force_z_[i] += one.force * inward[1];
     contacts.force += one.force;
     contacts.lost += one.lost;
-    if (!rough_ || !(spring.grip.friction > 0)) continue;
+    if (!(spring.grip.friction > 0)) continue;  // of smooth disks none has any
     double& stretch = wall_stretch_[walls * disk_of_[i] + wall];
     if (one.force == 0) {
       if (stretch != 0) rubbed_ += 0.5 * spring.grip.stiffness * stretch * stretch;

@@ -351,6 +351,28 @@ TEST(FitMistakes, OfAProfileThatDoesNotFallAreNamed) {
   EXPECT_NE(status(0.05, 0, 0), FitStatus::no_tail) << "without errors nothing tells";
 }
 
+// On both sides of the limits: 20 densities that go up and down by one number have chi2 = 20 (swing/error)^2, and a
+// tabled chi2 of 19 degrees of freedom exceeds 36.19 once in a hundred. And a first density of 1 over 19 others of
+// which the mean is just below half of it, or just above.
+TEST(FitMistakes, OfAFlatProfileHaveTheirLimits) {
+  const auto status = [](double first, double others, double swing, double error) {
+    Profile profile;
+    for (int i = 0; i < 20; ++i) {
+      profile.height.push_back(i);
+      profile.number_density.push_back((i == 0 ? first : others) + (i % 2 == 0 ? swing : -swing));
+      profile.std_error.push_back(error);
+    }
+    FitOptions options;
+    options.interval = options.sweep = options.compare = false;
+    options.window.low = 0, options.window.high = 20;
+    return fit_profile(profile, options).status;
+  };
+  EXPECT_EQ(status(0.5, 0.5, 0.05, 0.05 / std::sqrt(36.1 / 20)), FitStatus::no_tail);
+  EXPECT_NE(status(0.5, 0.5, 0.05, 0.05 / std::sqrt(36.3 / 20)), FitStatus::no_tail);
+  EXPECT_EQ(status(1, 0.475, 0, 1), FitStatus::no_tail);
+  EXPECT_NE(status(1, 0.473, 0, 1), FitStatus::no_tail);
+}
+
 // What was done to a profile before it is fitted.
 TEST(FitMistakes, OfAProfileAreMadeGoodAndSaid) {
   Profile profile;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "fit/theory/fermi_profile.hpp"
@@ -279,6 +280,32 @@ TEST(Tails, MoveWithTheirBed) {
     }
     // The rectangle, and the tail, whose weight is the pressure at its start.
     EXPECT_NEAR(area, 1.1 * 4 + enskog().pressure(1.1, 0.06).value, 2e-3) << to_string(kernel);
+  }
+}
+
+// Of a bed without temperature only the rectangle is there: its share under the kernel, and nothing above it.
+TEST(Tails, OfNoTemperatureAreTheirRectangle) {
+  Tail tail;
+  tail.table = &enskog().inverse_table();
+  tail.base = 1, tail.reference = 5, tail.rectangle_density = 1.1;
+  tail.f_reference = std::log(1.1) + enskog().excess(1.1);
+  tail.d_rectangle = {0, 0, 1};
+  tail.prepare(enskog());
+  const auto share = [](const Kernel& kernel, double height) {
+    if (kernel.kind == KernelKind::none) return height >= 1 && height <= 5 ? 1.0 : 0.0;
+    if (kernel.kind == KernelKind::top_hat)
+      return std::clamp(std::min(height + 0.5, 5.0) - std::max(height - 0.5, 1.0), 0.0, 1.0);
+    const double scale = kernel.width * std::numbers::sqrt2;
+    return 0.5 * (std::erf((height - 1) / scale) - std::erf((height - 5) / scale));
+  };
+  for (const Kernel& kernel : {Kernel{}, Kernel{KernelKind::gaussian, 0.4}, Kernel{KernelKind::top_hat, 1}}) {
+    for (double height = -1.1; height < 8; height += 0.4) {
+      const double expected = share(kernel, height);
+      const auto found = tail.smoothed_with_gradient(height, KernelRule(kernel));
+      EXPECT_NEAR(found[0], 1.1 * expected, 1e-12) << to_string(kernel) << ' ' << height;
+      EXPECT_NEAR(found[3], expected, 1e-12) << to_string(kernel) << ' ' << height;
+      EXPECT_NEAR(tail.smoothed(height, KernelRule(kernel)), 1.1 * expected, 1e-12) << to_string(kernel);
+    }
   }
 }
 

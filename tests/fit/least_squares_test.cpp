@@ -165,6 +165,22 @@ void expect_sandwich(const Problem& problem) {
   }
 }
 
+// The minimum does not depend on where its search began: differences of chi2 would leave a relative 1e-8 of it open.
+TEST(LeastSquares, EndsAtOneMinimumFromEveryStart) {
+  Problem problem = correlated_problem(0.0);
+  std::vector<FitModel::Parameters> found;
+  for (const FitModel::Parameters& start :
+       {FitModel::Parameters{0.12, 8.0, 1.10}, {0.2, 9.0, 1.10}, {0.08, 7.5, 1.10}, {0.15, 8.4, 1.10}}) {
+    const Solution solution = least_squares(problem.bins, *problem.model, start, problem.options);
+    ASSERT_TRUE(solution.converged);
+    found.push_back(solution.parameters);
+  }
+  for (const FitModel::Parameters& one : found) {
+    EXPECT_NEAR(one[0] / found[0][0], 1, 1e-11);
+    EXPECT_NEAR(one[1] / found[0][1], 1, 1e-11);
+  }
+}
+
 TEST(LeastSquares, ErrorsComeThroughTheCorrelations) { expect_sandwich(correlated_problem(0.6)); }
 
 // Errors that are not known: the scale is 1.4826 of the median size of all residuals, also of the first, and beyond

@@ -89,6 +89,14 @@ TEST(ShakingFrequency, IsRefinedByALongFilm) {
   EXPECT_NEAR(all.phase, 0.3, 0.01);
 }
 
+// Around 0.1 with an error of 0.1 cycles a frame: a line at 2.5 errors is found, one at 3.6 is not.
+TEST(ShakingFrequency, IsRefinedWithinThreeErrors) {
+  FoundFrequency rough;
+  rough.known = true, rough.cycles_per_frame = 0.1, rough.std_error = 0.1;
+  EXPECT_NEAR(refine_frequency(moving(48, 0.35, 1, 0.01, 3), rough).cycles_per_frame, 0.35, 1e-3);
+  EXPECT_LT(refine_frequency(moving(48, 0.46, 1, 0.01, 3), rough).cycles_per_frame, 0.45);
+}
+
 TEST(ShakingFrequency, TheFirstToneIsToldFromItsOvertones) {
   std::vector<PlaceInFrame> places;
   for (std::size_t k = 0; k < 150; ++k) {  // a parabola every 12.7 frames: what is thrown up

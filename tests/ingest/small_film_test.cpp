@@ -169,6 +169,19 @@ TEST(SmallFilm, EndsWhereItsBordersCutBeads) {
   EXPECT_THROW(measured({small_frame(low)}, options), std::invalid_argument);
 }
 
+// A surface is out of view where more beads are cut than there are frames, here one of one. The number of beads is
+// unknown all the same: among 25 one bead is more than one in two thousand.
+TEST(SmallFilm, HasItsSurfaceInViewWhereEveryFrameCutsOneBead) {
+  std::vector<RenderedDisk> disks = four_rows();
+  disks.push_back({72, 2, 8, 0, 0});
+  MeasureOptions options = small_options();
+  options.floor_px = 110, options.left_wall_px = 9, options.right_wall_px = 132, options.scale_m_per_px = 1e-4;
+  const Measurement found = measured({small_frame(disks)}, options);
+  ASSERT_EQ(found.disks.size(), 25U);
+  EXPECT_FALSE(found.surface_out_of_view);
+  EXPECT_FALSE(found.column_known);
+}
+
 // A bed that goes up and down by 4 px, without a frame rate: half of the range is the floor's error, or half of the
 // amplitude given raises it.
 TEST(SmallFilm, ThatMovesDoubtsItsFloor) {

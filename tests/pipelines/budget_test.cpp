@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -561,6 +562,34 @@ TEST(BudgetRun, IsNotForSweeps) {
   const ProgramResult ran = run_shakebed({"run", "sweep.json", "--budget", "1 %"}, folder.path());
   EXPECT_EQ(ran.exit_code, 2) << ran.err;
   EXPECT_THAT(ran.err, HasSubstr("sweep"));
+}
+
+// Each pilot of a stage has a line of progress of its own. By a clock that goes on by a minute whenever it is asked, a
+// line shows every call but the first of each pilot.
+TEST(BudgetRun, BeginsItsProgressWithEachPilot) {
+  const ScratchFolder folder;
+  const std::string small = R"({"name": "hot", "stages": [
+    {"stage": "simulate", "id": "bed", "units": "reduced", "disks": {"count": 6, "restitution": 0.95, "contact_duration": 1e-5},
+     "box": {"width": 5.3, "sides": "periodic"},
+     "floor": {"motion": "sinusoidal", "frequency": 0.45, "gamma": 5, "restitution": 0.95}, "settle": 4, "measure": 20}]})";
+  std::vector<Problem> problems;
+  const Plan plan = make_plan(*parse_json(small, "hot.json", problems), "hot.json", folder.path());
+  RunOptions options;
+  options.out = folder / "o", options.jobs = 1;
+  int calls = 0;
+  testing::internal::CaptureStderr();
+  {
+    Console console(Console::Level::normal,
+                    [&] { return Console::Clock::time_point{} + std::chrono::minutes(++calls); });
+    choose_by_budget(plan, parse_budget("8 %"), options, console);
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  int pilots = 0, lines = 0;
+  while (std::filesystem::exists(folder / "o/.pilot/bed" / std::to_string(pilots))) ++pilots;
+  for (std::size_t at = said.find("  bed: pilot:"); at != std::string::npos; at = said.find("  bed: pilot:", at + 1))
+    ++lines;
+  EXPECT_GE(pilots, 2);
+  EXPECT_EQ(calls - lines, pilots) << said;
 }
 
 // What a finished run says of its error: that of four beds has Student's factor 1.6237, and is 0.04 x 1.6237/2; within

@@ -337,6 +337,24 @@ TEST(ExtractedPhotographs, ObjectToASecondDiameterThatIsNotSeen) {
   EXPECT_THAT(found["objections"].dump(), HasSubstr("give the radius of the first kind (--radius)"));
 }
 
+// Of a film of pictures the first says where the sides are, here that they are not where they were.
+TEST(ExtractedPhotographs, TakeTheirSidesFromTheFirst) {
+  for (const bool first : {true, false}) {
+    ExtractedPhotograph film;
+    const std::vector<std::string> names = {film.stage.file("a.png").string(), film.stage.file("b.png").string()};
+    for (const std::string& name : names)
+      ingest::write_png(name, {.width = 12, .height = 10, .pixels = std::vector<float>(120, 90.0F)});
+    ingest::add_png_text(names[first ? 0 : 1], FrameGeometry::keyword,
+                         "periodic sides at columns 11.5 and 137.5 of 150 x 148 px");
+    film.options.images.texts = film.options.images.paths = names;
+    EXPECT_THROW(film.extracted(), StageError) << "no beads";
+    const auto cut =
+        HasSubstr("a.png: this is a simulated bed with periodic sides, in a picture that was cut or scaled");
+    EXPECT_THAT(film.stage.warnings, first ? testing::Matcher<std::vector<std::string>>(Contains(cut))
+                                           : testing::Matcher<std::vector<std::string>>(IsEmpty()));
+  }
+}
+
 TEST(ExtractedPhotographs, AreThoseThatAreNamed) {
   ExtractedPhotograph named;
   named.options.images.paths.push_back(named.stage.file("notes.txt").string());

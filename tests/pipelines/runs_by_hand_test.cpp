@@ -327,6 +327,22 @@ TEST_F(SweepsByHand, RunInShards) {
   EXPECT_THROW(sweep(plan, "1/3", true), UsageError);
 }
 
+// What is there of an earlier recipe, and not run again, is no point of this one.
+TEST_F(SweepsByHand, GatherNothingOfAnotherRecipe) {
+  EXPECT_EQ(sweep(gammas("[2, 3]")), exit_ok);
+  std::string changed = map_of("4");
+  changed.replace(changed.find("20 Hz"), 5, "25 Hz");
+  const Plan plan =
+      this->plan(changed, R"("sweep": { "over": { "/stages/map/gamma": [2, 3] }, "collect": ["/map/gamma"] }, )");
+  EXPECT_EQ(sweep(plan, "", true), exit_stage_failed);
+  EXPECT_EQ(arguments_.result["missing"], 2);
+  EXPECT_FALSE(pages_.complete);
+  for (const std::size_t row : {1U, 2U}) {
+    EXPECT_EQ(pages_.table[row][2], "missing");
+    EXPECT_EQ(pages_.table[row][4], "");
+  }
+}
+
 TEST_F(SweepsByHand, SayWhatWouldRun) {
   const Plan plan = gammas("[2, 3]");
   sweep(plan, "2/2");

@@ -106,6 +106,15 @@ TEST_F(StageMistakes, OfTheTimeAndItsFrames) {
             "/stages/0/frames/at: the floor does not shake, so frames have no phases. Remove \"at\"");
 }
 
+// Also of a floor that shakes several times in a unit of time.
+TEST_F(StageMistakes, OfPhasesAreNamedForAFastFloor) {
+  const std::string fast =
+      R"("floor": { "motion": "sinusoidal", "amplitude": 0.1, "frequency": 4, "restitution": 0.9 })";
+  EXPECT_EQ(said_of(bed(fast + R"(, "frames": { "count": 8, "phases": 4, "at": [0.3] })")),
+            "/stages/0/frames/at: the bed is not sampled at these phases, or one is named twice. Give different "
+            "multiples of 1/4 from 0 to below 1");
+}
+
 // In reduced units advice is a plain number, as every time in the recipe is.
 TEST_F(StageMistakes, HaveAdviceInTheUnitsOfTheRecipe) {
   EXPECT_EQ(said_of(bed(shaken, "bed", "1")),

@@ -232,4 +232,12 @@ TEST(EditDistance, CountsChangesAndSwapsAsOne) {
   EXPECT_EQ(edit_distance("kitten", "sitting"), 3);
 }
 
+// What stands beside a word in a longer text is no part of it.
+TEST(EditDistance, IsThatOfTheWordsAlone) {
+  const std::string_view text = "xay";
+  EXPECT_EQ(edit_distance(text.substr(1, 1), "zzax"), 3);
+  EXPECT_EQ(edit_distance(text.substr(1, 1), "zzay"), 3);
+  EXPECT_EQ(edit_distance("zzax", text.substr(1, 1)), 3);
+}
+
 }  // namespace

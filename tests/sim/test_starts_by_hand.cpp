@@ -641,6 +641,25 @@ TEST(LockedByHand, RowBetweenWallsComesToRest) {
   EXPECT_EQ(run->energy().floor_work, 0);
 }
 
+// What follows is that of disks at rest: one of mass 1 falls from z = 7 at speed 1 on the third, of mass 3, which it
+// meets at time 2. Then it has (1 - 3)/(1 + 3) of its velocity, and the third 2/(1 + 3).
+TEST(LockedByHand, RowAtRestIsMetWhereItLies) {
+  Scene scene = touching(chain, false, 0.5);
+  scene.box.sides = HardSides{};
+  scene.box.top = Lid{9, {}};
+  scene.disks.species[0].count = 4;
+  std::get<PlacedStart>(scene.start).disks.push_back({2.5, 7, 0, -1, 0, 0});
+  const auto run = relieved(scene);
+  run->advance_to(3);
+  const Snapshot at = snapshot_of(*run);
+  for (std::size_t k = 0; k < 7; ++k) {
+    const bool falls = k == 6, hit = k == 2;
+    EXPECT_NEAR(at.x[k], falls ? 2.5 : 0.5 + static_cast<double>(k), 1e-9) << k;
+    EXPECT_NEAR(at.z[k], falls ? 5.5 : hit ? 3.5 : 4, 1e-9) << k;
+    EXPECT_NEAR(at.vz[k], falls ? 0.5 : hit ? -0.5 : 0, 1e-9) << k;
+  }
+}
+
 TEST(LockedByHand, ColumnBetweenFloorAndLidComesToRest) {
   Scene scene = touching(chain, true, 0.5);
   scene.box.width = 8;

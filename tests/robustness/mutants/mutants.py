@@ -433,6 +433,8 @@ class Bench:
         words += [f"-Wl,-rpath,{self.work}/lib", f"-Wl,-rpath-link,{self.work}/lib", "-Wl,-z,lazy"]
         if not output.endswith(".so"):
             words.insert(0, f"-Wl,--no-as-needed {self.fault} -Wl,--as-needed")
+            # Before the fault, which may hold the main() of the program.
+            words[0:0] = [word for word in words if word.endswith("/libgtest_main.a")]
         self.must("c++ " + " ".join(words))
 
     def no_fault(self):
