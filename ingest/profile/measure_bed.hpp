@@ -177,7 +177,7 @@ struct Measurement {
     return column_known ? std::optional(count_in_width_mean / calibration.width) : std::nullopt;
   }
   bool floor_out_of_view = false;    // the lower border cuts beads, and no floor was given
-  bool surface_out_of_view = false;  // the upper border cuts beads, one a frame or more
+  bool surface_out_of_view = false;  // the upper border cuts beads, more than one a frame
   bool column_known = true;          // no more beads are above the upper border than the column number's error allows
   Contacts contacts;                 // in the frames that geometry is found from
   std::size_t beside_bed = 0;        // disks left out, a few beyond an empty stretch beside the bed
