@@ -1,8 +1,8 @@
 # Read by ctest: one case for each suite of the GoogleTest program `program` that has tests that pass `filter`, with the
 # `labels` and the `timeout` given. Its name is the suite's with `suffix`, of a single test that test's own. Suites with
-# many tests are started first. The suites in `small`, few of which take longer than the program does to start, are one
-# case: the program's name with ".small" and `suffix`. A suite is skipped when all of its tests are. Where only some
-# are, its output names them: an expression for them would hide failures of the others.
+# many tests are started first. The suites in `small`, which take little time, are one case: the program's name with
+# ".small" and `suffix`. A suite is skipped when all of its tests are. Where only some are, its output names them: an
+# expression for them would hide failures of the others.
 if(NOT EXISTS "${program}")
   get_filename_component(name "${program}" NAME)
   add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)

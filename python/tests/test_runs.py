@@ -86,7 +86,9 @@ def test_control_c_ends_the_program_too(recipe, tmp_path):
             f"except KeyboardInterrupt:\n    sys.exit(42)\n")
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
     assert process.stdout.readline() == b"ready\n"
-    time.sleep(0.2)
+    while not list((tmp_path / "out").glob(".partial-bed-*")):  # the stage has begun
+        assert process.poll() is None
+        time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 42
     process.stdout.close()

@@ -237,6 +237,9 @@ TEST(Photographs, LengthsOfAReducedBedAreThoseOfThePicture) {
     squares += nearest;
   }
   EXPECT_LT(std::sqrt(0.5 * squares / static_cast<double>(disks.size())), 0.03) << "px per axis";
+  const BedFound by_three = measure_bed({folder / "bed.png"}, {.bead_diameter_m = 3e-3, .threads = 3});
+  ASSERT_EQ(by_three.measurement.disks.size(), disks.size());
+  for (std::size_t k = 0; k < disks.size(); ++k) EXPECT_EQ(by_three.measurement.disks[k].x_px, measured.disks[k].x_px);
 }
 
 // Beads are red on grey. What the survey of its channels has learned is what the search alone learns.

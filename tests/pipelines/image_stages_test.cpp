@@ -322,6 +322,7 @@ TEST(ExtractedPhotographs, ObjectToAScaleThatContradictsTheDiameter) {
   ExtractedPhotograph plain, scaled, nearly;
   const std::vector<std::string> usual = reasons_of(plain.extracted());
   EXPECT_THAT(usual, Not(Contains(HasSubstr("By the scale"))));
+  EXPECT_THAT(plain.stage.warnings, Not(Contains(HasSubstr("frame rate")))) << "it is no film";
   scaled.options.scale = 2e-4 * 1.13;  // 17.7 px
   EXPECT_THAT(reasons_of(scaled.extracted()),
               Contains(HasSubstr("By the scale and the diameter given, a bead is 17.7 px wide")));

@@ -146,7 +146,7 @@ TEST_F(OneFact, AKernelThatAnOptionNamesNeedNotBeInTheFile) {
 }
 
 TEST_F(OneFact, AKernelHasOneSpellingInOptionsAndFiles) {
-  for (const std::string kind : {"top_hat", "disk_chord"}) {
+  for (const std::string kind : {"gaussian", "top_hat", "disk_chord"}) {
     std::string recipe = photographed_bed(R"(, "kernel": { "kind": ")" + kind + R"(", "width": 0.8 })");
     const std::string measure = R"("measure": "1 s",)";
     recipe.replace(recipe.find(measure), measure.size(),
@@ -162,7 +162,7 @@ TEST_F(OneFact, AKernelHasOneSpellingInOptionsAndFiles) {
     EXPECT_EQ(result(kind + "/extract/extract.json")["kernel"]["kind"], kind);
   }
   const ProgramResult wrong =
-      run_shakebed({"fit-profile", "top_hat/bed/profile.csv", "--kernel", "top-hat:1"}, folder_.path());
+      run_shakebed({"fit-profile", "gaussian/bed/profile.csv", "--kernel", "top-hat:1"}, folder_.path());
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("top_hat:1"));
 }

@@ -209,6 +209,13 @@ TEST_F(Pipeline, TwoSweepsDifferInNothingButTheirCost) {
   EXPECT_THAT(different(a, b), testing::IsEmpty());
 }
 
+TEST_F(Pipeline, AStageStatesWhatItsMeasurementCost) {
+  ASSERT_EQ(run({"run", "r.json", "--out", "a", "--until", "bed"}).exit_code, 0);
+  const Json cost = read_json(folder_ / "a/bed/cost.json");
+  EXPECT_GT(cost["measuring_cpu_seconds"].get<double>(), 0);
+  EXPECT_LT(cost["measuring_cpu_seconds"].get<double>(), cost["simulation_cpu_seconds"].get<double>()) << "it settled";
+}
+
 TEST_F(Pipeline, AStageMadeAgainWithTheSameResultLetsWhatFollowsRest) {
   ASSERT_EQ(run_recipe().exit_code, 0);
   ASSERT_EQ(run_recipe({"--only", "bed", "--force"}).exit_code, 0);

@@ -649,7 +649,7 @@ TEST(Engine, KeepsItsOrderThroughBursts) {
   scene.box.floor = SinusoidalFloor{200, 0.02};  // flies for tens of time units, then lands all at once
   scene.box.floor_surface = {0.7, 0, 0};
   const auto bed = simulate(scene);
-  for (double time = 3; time < 75; time += 3) {
+  for (double time = 3; time < 120; time += 3) {
     bed->advance_to(time);
     ASSERT_LE(bed->largest_overlap(), 1e-12) << "time " << time;
   }

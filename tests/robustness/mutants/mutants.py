@@ -616,9 +616,10 @@ class Bench:
 def quick_filter(base, program):
     """What the quick tests of a program are, as --gtest_filter has it."""
     folder, name = (base / program).parent, Path(program).name
+    used = (folder / "CTestTestfile.cmake").read_text()  # files of earlier configurations may be left
     for path, pattern in ((folder / f"{name}[1]_include.cmake", r"TEST_FILTER \[==\[(.*?)\]==\]"),
                           (folder / f"{name}_quick_suites.cmake", r'set\(filter "(.*?)"\)')):
-        if path.exists():
+        if path.name in used:
             found = re.search(pattern, path.read_text())
             if found and found.group(1):
                 return found.group(1)
@@ -643,8 +644,13 @@ def long_tests(bench, room):
 
 
 def recorded_costs(bench):
-    """Seconds of every test without a fault, as ctest has written them down."""
+    """Seconds of every test without a fault, as ctest has written them down: of a suite, and of the tests that its last
+    output names."""
     costs = {}
+    log = bench.base / "Testing/Temporary/LastTest.log"
+    if log.exists():
+        for name, milliseconds in re.findall(r"\[ +OK \] ([\w./]+).* \((\d+) ms\)", log.read_text(errors="replace")):
+            costs[name] = int(milliseconds) / 1000
     for name in ("Testing/Temporary/CTestCostData.txt", "CTestCostData.txt"):
         if (bench.base / name).exists():
             for line in (bench.base / name).read_text().splitlines():
