@@ -9,6 +9,7 @@
 #include "ingest/calibrate/solid_borders.hpp"
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/learn_from_part.hpp"
+#include "ingest/find/lit_rim.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/frames/smooth_field.hpp"
 
@@ -30,6 +31,13 @@ constexpr double least_filled = 0.2;
 // The line at which the dark side of a sphere begins is sharper than the model of its light: drawn layers under a lamp
 // 34 to 45 degrees high 0.8 to 1.6, 30 degrees 2.2 to 2.7.
 constexpr double most_misfit_of_lit = 2;
+// Lit disks that do not touch are beads where circles show a good part of them, where noise is so small a share of the
+// contrast that other shapes would leave more than it, and where their lit rim is that circle. Drawn spheres: rms
+// 0.001 to 0.005 radii, radius 0.956 to 0.994, offset up to 0.02; ellipses of 0.93 and 0.8: 0.009 to 0.011 and 0.028
+// to 0.033; squares with round corners 0.04.
+constexpr double least_shown = 0.3, most_noise = 0.06;
+constexpr double round_lit_rim = 0.008, least_lit_rim = 0.93, most_lit_rim = 1.03, most_lit_offset = 0.04;
+constexpr double same_as_circle = 0.4;
 constexpr double smallest_px = 3;  // smaller disks are specks
 constexpr int part_px = 400;
 // Radii: half the distance of neighbours that may be parts of disks that touch.
@@ -89,8 +97,10 @@ bool is_small(const PackedBed& bed) {
 }  // namespace
 
 bool Packing::describes() const {
-  return disks >= fewest_disks && touching >= least_touching && overlapping <= most_overlapping &&
-         unexplained <= most_unexplained && misfit <= (lit ? most_misfit_of_lit : most_misfit);
+  const bool touch = touching >= least_touching && misfit <= (lit ? most_misfit_of_lit : most_misfit);
+  const bool are_shown = lit && round && shown >= least_shown && noise <= most_noise && misfit <= most_misfit;
+  return disks >= fewest_disks && overlapping <= most_overlapping && unexplained <= most_unexplained &&
+         (touch || are_shown);
 }
 
 bool Packing::convinces() const { return describes() && filled >= least_filled; }
@@ -105,6 +115,7 @@ Packing packing_of(const GrayFrame& frame, const FindResult& found, const Finder
   packing.touching = contacts.touching;
   packing.overlapping = contacts.overlapping;
   const double noise = std::hypot(faces.noise_level, model_contrast * contrast);
+  packing.noise = faces.noise_level / contrast;
   const double plainly = std::max(plainly_sigmas * noise, plainly_contrast * contrast);
   const GrayFrame left = residual_frame(frame, found, faces), in_view = seen_part(frame, faces);
   const Nearby near(found.disks.size(), beside_disk * radius,
@@ -127,13 +138,37 @@ Packing packing_of(const GrayFrame& frame, const FindResult& found, const Finder
   return packing;
 }
 
+namespace {
+
+// Share of the disks about whose centre a circle was seen.
+double share_shown(const std::vector<FoundDisk>& disks, const Places& circles, double radius) {
+  const Nearby near(circles.size(), same_as_circle * radius, [&](std::size_t i) { return circles[i]; });
+  const auto shown = std::count_if(disks.begin(), disks.end(),
+                                   [&](const FoundDisk& disk) { return near.any_near(disk.x_px, disk.y_px); });
+  return static_cast<double>(shown) / std::max(1.0, static_cast<double>(disks.size()));
+}
+
+// Whether the lit rims of these disks, of this radius, are their circle.
+bool lit_rims_are_round(const GrayFrame& frame, const std::vector<FoundDisk>& disks, const FinderCalibration& faces) {
+  const auto rim = lit_rim_of(frame, circles_of(disks), faces.polarity);
+  if (!rim) return false;
+  const double radius = faces.radius_px, ratio = rim->radius_px / radius;
+  return rim->rms_radii <= round_lit_rim && ratio >= least_lit_rim && ratio <= most_lit_rim &&
+         std::hypot(rim->right_px, rim->down_px) <= most_lit_offset * radius;
+}
+
+}  // namespace
+
 PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFrame*>& frames,
-                        const FindOptions& options) {
+                        const FindOptions& options, const Places& circles) {
   PackedBed bed;
   bed.faces = std::move(faces);
   tell_radius(bed.faces);
   FindResult found = find_disks(*frames.back(), bed.faces.calibration, options);
   bed.packing = packing_of(*frames.back(), found, bed.faces.calibration);
+  bed.packing.shown = share_shown(found.disks, circles, bed.faces.calibration.radius_px);
+  if (bed.packing.lit && bed.packing.shown > 0)
+    bed.packing.round = lit_rims_are_round(*frames.back(), found.disks, bed.faces.calibration);
   bed.disks = std::move(found.disks);
   if (!bed.packing.describes()) {
     bed.faces.found = false;
@@ -145,7 +180,7 @@ PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFra
 PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,
                            const Places& beads) {
   CalibrationResult faces = learn_finder_from_part(frames, options, beads);
-  if (faces.found) return packed_bed_of(std::move(faces), frames, options);
+  if (faces.found) return packed_bed_of(std::move(faces), frames, options, beads);
   PackedBed bed;
   bed.faces = std::move(faces);
   return bed;

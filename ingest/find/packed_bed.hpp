@@ -24,8 +24,11 @@ struct Packing {
   double unexplained = 0;  // share of the pixels on and beside the disks where the model is plainly off
   double misfit = 0;       // rms of these pixels' residuals over that of the noise alone
   double filled = 0;       // share of the upright rectangle round the disks, as far as it is seen
+  double noise = 0;        // over the contrast
+  double shown = 0;        // share of the disks that a circle shows as well, where circles are known
   bool lit = false;        // the model of a disk is brighter on one side
-  // Disks that touch, and what is beside them; and these lie close.
+  bool round = false;      // the rim on that side is the circle of the disks, where circles are known
+  // Disks that touch, or lit ones that circles show, and what is beside them; and these lie close.
   [[nodiscard]] bool describes() const;
   [[nodiscard]] bool convinces() const;
 };
@@ -43,8 +46,9 @@ struct PackedBed {
 };
 
 // Whether faces learned from these frames are those of disks that touch. `faces`: from learn_finder(), found.
+// `circles`: centres of circles that were seen in the last frame, if any.
 PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFrame*>& frames,
-                        const FindOptions& options);
+                        const FindOptions& options, const Places& circles = {});
 
 // From the radius in `options`, or with nothing to start from. `beads`: as in learn_finder_from_part().
 PackedBed learn_packed_bed(const std::vector<const GrayFrame*>& frames, const FindOptions& options,

@@ -12,6 +12,7 @@
 #include "ingest/find/circle_census.hpp"
 #include "ingest/find/drawing_signs.hpp"
 #include "ingest/find/edge_map.hpp"
+#include "ingest/find/lit_rim.hpp"
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/packed_bed.hpp"
 #include "ingest/find/picture_maps.hpp"
@@ -38,8 +39,8 @@ constexpr double least_explained =
 constexpr double least_side = 0.15;
 constexpr double one_sided_support = 0.6, one_sided_explained = 0.4, one_sided_by_chance = 0.02;
 constexpr double fewest_one_sided = 20;
-// Where the radius is given, so many of it that make up this share of the edges are enough.
-constexpr double one_sided_explained_if_given = 0.25;
+// So many of them are plausible where they make up this share of the edges.
+constexpr double one_sided_plausible = 0.25;
 constexpr const char* one_side_missing = "one side of the rim is missing from all circles";
 // Radii, over which the level changes at a rim: beads up to 0.44, softly enlarged ones 0.73, noise smoothed over a
 // length 1.4, blurred spots 1.6. Spots are beads where they, and little else, make up the picture.
@@ -47,6 +48,11 @@ constexpr double widest_rim = 1.1, spots_explained = 0.5;
 constexpr double much_smaller = 0.7;  // radii
 // px: below it a bead looks like a speck, a pore or a dot of text, and its radius has to be given.
 constexpr double speck_px = 4;
+// Share of the turn from which steep edges are no sign of light from one side.
+constexpr double steep_all_round = 0.75;
+constexpr double nearly_round = 0.02;    // radii, rms of these edges about their circle
+constexpr double clearly_larger = 1.06;  // radii of the circles
+constexpr std::size_t fewest_lit = 8, most_lit_starts = 2;
 // Of the picture's shorter side: larger radii are not proposed, since a bed shows more than two beads in a row.
 constexpr double largest_proposed = 0.25;
 // px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
@@ -180,10 +186,10 @@ void judge_shape(SurveyCandidate& candidate, const Roundness& roundness, bool an
     candidate.why_not = candidate.why_not_round;
 }
 
-// Whether circles without one side would be believed if their radius were given.
-bool lit_if_given(const SurveyCandidate& candidate) {
+// Whether circles without one side may be parts of beads.
+bool may_be_lit(const SurveyCandidate& candidate) {
   return static_cast<double>(candidate.disks.size()) >= fewest_one_sided &&
-         candidate.explained_share >= one_sided_explained_if_given;
+         candidate.explained_share >= one_sided_plausible;
 }
 
 void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
@@ -202,7 +208,6 @@ void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
   candidate.one_sided = least_seen_side(candidate.disks) < least_side;
   const bool plainly_lit = count >= fewest_one_sided && support >= one_sided_support * count &&
                            candidate.explained_share >= one_sided_explained && at_worst <= one_sided_by_chance;
-  const bool lit_from_one_side = plainly_lit || (given && lit_if_given(candidate));
   if (candidate.disks.empty())
     candidate.why_not = "no circles are seen beyond what chance gives";
   else if (at_worst > most_by_chance || (!given && at_worst > few_wrong && candidate.explained_share < good_part))
@@ -210,7 +215,7 @@ void judge(SurveyCandidate& candidate, double edge_length_px, bool given) {
   else if (few_and_faint(candidate.disks, support, given))
     candidate.why_not = formatted("only %.0f circles are seen, and only %.0f %% of their rims is visible", count,
                                   100 * support / count);
-  else if (candidate.one_sided && !lit_from_one_side)
+  else if (candidate.one_sided && !plainly_lit)
     candidate.why_not = one_side_missing;
   else if (candidate.explained_share < least_explained) {
     candidate.few_edges = true;
@@ -255,6 +260,13 @@ void enlarge(SurveyCandidate& candidate, int factor) {
   }
 }
 
+// Px of a frame that is reduced by averaging.
+Circle in_reduced(Circle circle, int factor) {
+  circle.x = (circle.x + 0.5) / factor - 0.5, circle.y = (circle.y + 0.5) / factor - 0.5;
+  circle.radius /= factor;
+  return circle;
+}
+
 // Share of the edges that are gone once the beads are taken out, and their length.
 void explain_edges(SurveyCandidate& candidate, const GrayFrame& frame, const PackedBed& bed) {
   FindResult found;
@@ -294,15 +306,30 @@ bool leaves_room(const SurveyCandidate& candidate, int reduction) {
   return touching && *touching > room * candidate.rims.open_radius_px && *touching <= largest_packed_px * reduction;
 }
 
-// Radii at which circles would touch of which one side is missing: spheres lit from the other, whose dark side no
-// circle shows. Their faces tell whether they are beads.
-std::vector<PackedStart> lit_starts(const Survey& survey, Channel channel, int reduction) {
+// Where circles show parts of spheres lit from one side: the radius at which their lit rims lie or, where these show
+// none, at which the circles would touch. Their faces tell whether they are beads.
+std::optional<PackedStart> lit_start(const SurveyCandidate& candidate, const GrayFrame& frame, int reduction) {
+  if (candidate.disks.size() < fewest_lit) return std::nullopt;
+  std::vector<Circle> circles = circles_of(candidate.disks);
+  for (Circle& circle : circles) circle = in_reduced(circle, reduction);
+  const auto rim = lit_rim_of(frame, circles, candidate.rims.polarity);
+  const bool lit = rim && rim->steep < steep_all_round && rim->rms_radii < nearly_round;
+  const bool one_sided = candidate.plausible && candidate.why_not == one_side_missing;
+  const bool a_part =
+      !candidate.credible || (rim && rim->radius_px > clearly_larger * candidate.rims.radius_px / reduction);
+  if (!(lit || one_sided) || !a_part) return std::nullopt;
+  const auto radius = rim ? std::optional(rim->radius_px) : touching_radius(circles);
+  if (!radius) return std::nullopt;
+  return PackedStart{candidate.rims.polarity, *radius, places_of(circles)};
+}
+
+// Of the candidate that was found, or else of all.
+std::vector<PackedStart> lit_starts(const Survey& survey, const GrayFrame& frame, Channel channel, int reduction) {
   std::vector<PackedStart> starts;
   for (const SurveyCandidate& candidate : survey.candidates) {
-    if (!candidate.plausible || candidate.why_not != one_side_missing || candidate.channel != channel) continue;
-    const std::vector<Circle> circles = circles_of(candidate.disks);
-    if (const auto radius = touching_radius(circles))
-      starts.push_back({candidate.rims.polarity, *radius / reduction, places_of(circles, reduction)});
+    if (candidate.channel != channel || starts.size() == most_lit_starts) continue;
+    if (auto start = lit_start(candidate, frame, reduction)) starts.push_back(std::move(*start));
+    if (survey.found) break;
   }
   return starts;
 }
@@ -336,10 +363,10 @@ struct SurveyedPicture {
 // that leave room and beads that touch, only these describe the picture.
 void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const CircleCensus& census,
                          const SurveyOptions& options) {
-  std::vector<PackedStart> starts = starts_from(census, options, picture.reduction);
-  if (!survey.found && !options.radius_px) {
-    const std::vector<PackedStart> lit = lit_starts(survey, picture.channel, picture.reduction);
-    starts.insert(starts.begin(), lit.begin(), lit.end());
+  std::vector<PackedStart> starts = lit_starts(survey, picture.frame, picture.channel, picture.reduction);
+  if (!survey.found || leaves_room(survey.candidates.front(), picture.reduction)) {
+    const std::vector<PackedStart> others = starts_from(census, options, picture.reduction);
+    starts.insert(starts.end(), others.begin(), others.end());
   }
   if (!survey.found && !options.radius_px) starts.push_back({options.polarity, std::nullopt});
   const std::optional<PackedBed> bed = look_for_packed_bed(picture.frame, starts);
@@ -406,8 +433,8 @@ SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis
   candidate.rims = std::move(learned.model);
   candidate.disks = std::move(learned.disks);
   judge(candidate, learned.edge_length_px, given);
-  const bool may_be_lit = candidate.why_not == one_side_missing && lit_if_given(candidate);
-  candidate.plausible = (candidate.why_not.empty() || may_be_lit) && candidate.rims.radius_px <= asked.largest_px;
+  const bool lit = candidate.why_not == one_side_missing && may_be_lit(candidate);
+  candidate.plausible = (candidate.why_not.empty() || lit) && candidate.rims.radius_px <= asked.largest_px;
   if (const char* why = why_drawn(asked.signs, candidate.explained_share)) candidate.why_drawn = why;
   if (candidate.why_not.empty() && !asked.options.any_shape) candidate.why_not = candidate.why_drawn;
   if (candidate.why_not.empty()) {
@@ -601,8 +628,7 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
                    });
   survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
   if (effort == Effort::glance && !survey.found) return survey;
-  if (!survey.found ||
-      (!survey.candidates.front().region && leaves_room(survey.candidates.front(), frames.reduction))) {
+  if (!survey.found || !survey.candidates.front().region) {
     const std::size_t channel = census.hypotheses.empty() ? 0 : census.hypotheses.front().channel;
     SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs};
     consider_packed_bed(survey, picture, census, options);
