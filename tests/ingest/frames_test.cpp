@@ -388,8 +388,8 @@ TEST(Frames, ErrorsNameTheFileTheProblemAndTheCure) {
   };
   expect_error(folder / "absent.png", "no such file");
   expect_error(folder / "absent*.png", "nothing matches");
-  std::ofstream(folder / "empty.png").flush();
-  expect_error(folder / "empty.png", "empty");
+  std::ofstream(folder / "nothing.png").flush();
+  expect_error(folder / "nothing.png", "the file is empty");
   std::ofstream(folder / "text.png") << "this is not a picture";
   expect_error(folder / "text.png", "cannot be read");
   std::ofstream(folder / "notes.txt") << "hello";

@@ -362,11 +362,12 @@ TEST(ExtractedPhotographs, AreThoseThatAreNamed) {
   write_text(named.stage.file("notes.txt"), "no picture");
   EXPECT_EQ(named.extracted()["frames"], 1) << "a folder may hold other files";
   named.options.images.paths = {named.stage.file("notes.txt").string()};
+  named.options.images.texts = {"photos", "more"};
   try {
     named.extracted();
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no picture or film was found"));
+    EXPECT_THAT(error.what(), testing::StartsWith("photos: no picture or film was found"));
   }
 }
 

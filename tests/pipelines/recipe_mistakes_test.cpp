@@ -61,6 +61,15 @@ TEST(RecipeMistakes, OfTheWholeAreNamed) {
             "/name: \"a b\" cannot be the name of a folder. Use letters, digits, '-', '_' and '.'");
 }
 
+TEST(RecipeMistakes, InAListAreInTheLineOfTheirElement) {
+  const std::vector<Problem> problems =
+      mistakes_of(with("{ \"stage\": \"extract\", \"images\": \"a.png\",\n"
+                       "\"diameter\": \"3 mm\",\n\"roi\": [0,\n0,\n\"x\",\n40] }"));
+  ASSERT_FALSE(problems.empty());
+  EXPECT_EQ(problems.back().pointer, "/stages/0/roi/2");
+  EXPECT_EQ(problems.back().at.line, 5);
+}
+
 // A file that is no recipe has a problem in every line: after 1000 the rest is left alone.
 TEST(RecipeMistakes, AreThousandAtMost) {
   const auto count = [](std::size_t stages) {

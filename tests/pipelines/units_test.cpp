@@ -7,6 +7,7 @@
 #include <regex>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "pipelines/formats/quantity.hpp"
 #include "tests/pipelines/program.hpp"
@@ -84,6 +85,14 @@ TEST(Units, AreThoseOfTheSi) {
     EXPECT_DOUBLE_EQ(one.value, unit.factor) << name;
     EXPECT_DOUBLE_EQ(less.value, -0.25 * unit.factor) << name;
   }
+}
+
+// A number may be a part of a longer text, and have a sign.
+TEST(Units, FollowANumberThatEndsWithItsText) {
+  const std::string_view whole = "7+2.5 mm and 123 m";
+  EXPECT_EQ(parse_quantity(whole.substr(1, 7)).value, 0.0025);
+  EXPECT_EQ(parse_quantity(whole.substr(13, 2)).value, 12);
+  EXPECT_EQ(parse_quantity(whole.substr(13)).value, 123);
 }
 
 TEST(Units, HavePowersAndInverses) {

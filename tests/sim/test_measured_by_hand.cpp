@@ -330,6 +330,16 @@ TEST_F(BedAtRandom, HasItsLayersByPhase) {
   const Measured found = bed_.temperature_z_local(), whole = bed_.temperature_z();
   EXPECT_NEAR(found.value, local / (11 * 14), 1e-12);
   EXPECT_NEAR(found.std_error, found.value * whole.std_error / whole.value, 1e-14);
+  // Four times as slow, a sixteenth as hot: colder than m g D, too, it has its error.
+  for (Snapshot& at : all_.looks) {
+    at.floor_velocity /= 4;
+    for (std::size_t i = 0; i < at.vz.size(); ++i) at.vx[i] /= 4, at.vz[i] /= 4;
+  }
+  BedObserver slow = make();
+  for (std::size_t k = 0; k < all_.looks.size(); ++k)
+    slow.observe(all_.looks[k], static_cast<std::uint32_t>(k % all_.phases));
+  EXPECT_NEAR(slow.temperature_z_local().value, found.value / 16, 1e-12);
+  EXPECT_NEAR(slow.temperature_z_local().std_error, found.std_error / 16, 1e-14);
 }
 
 // Gaussians about the centres, in the frame of the box and in that of the floor; the covered fraction by each disk's

@@ -131,6 +131,16 @@ TEST(SlideSpinning, LetsADiskCreepWhileItSpins) {
   EXPECT_EQ(end.way.vz, 0);
 }
 
+// What such a disk has of another velocity at first carries it on by that velocity times rim over the deceleration, or
+// nearly so.
+TEST(SlideSpinning, StopsAcrossThePullWithinTheTimeOfItsSpin) {
+  const double a = 0.5, pull = -0.2, lever = 0.01, rim = 0.004, time = 1, across = 0.5 * rim;
+  const SpinningSlide end = slide_spinning(across, 0, rim, lever, pull, a, time),
+                      steps = by_small_steps(across, -1e-6, rim, lever, pull, a, time);
+  EXPECT_NEAR(end.way.x / (across * rim / a), 1, 1e-12);
+  EXPECT_NEAR(steps.way.x / end.way.x, 1, 0.05);
+}
+
 TEST(SlideSpinning, IsSlidingWhereNothingSpins) {
   const SpinningSlide both = slide_spinning(0.3, -0.2, 0, 1, -1, 0.7, 2);
   const Slide alone = slide(0.3, -0.2, -1, 0.7, 2);
