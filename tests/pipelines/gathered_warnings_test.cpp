@@ -71,6 +71,13 @@ TEST(Sweeps, SayTheVerdictOfEveryPoint) {
     EXPECT_THAT(ran.out, testing::HasSubstr(verdict));
   }
   EXPECT_EQ(summary["verdicts"], Json(verdicts));
+  // A point that has not run has none.
+  ASSERT_EQ(run_shakebed({"run", "r.json", "--out", "half", "--shard", "2/2"}, folder.path()).exit_code, 0);
+  run_shakebed({"run", "r.json", "--out", "half", "--gather"}, folder.path());
+  const Json half = Json::parse(read_text(folder / "half/summary.json"));
+  EXPECT_EQ(half["missing"], 1);
+  EXPECT_EQ(half["verdicts"].size(), 1U);
+  EXPECT_FALSE(half["verdicts"].contains(""));
 }
 
 }  // namespace

@@ -68,6 +68,12 @@ TEST(RecipeMistakes, InAListAreInTheLineOfTheirElement) {
   ASSERT_FALSE(problems.empty());
   EXPECT_EQ(problems.back().pointer, "/stages/0/roi/2");
   EXPECT_EQ(problems.back().at.line, 5);
+  const std::vector<Problem> in_sweep = mistakes_of(with(map_stage(),
+                                                         "\"sweep\": { \"kind\": \"list\", \"points\": [\n"
+                                                         "{ \"/stages/map/gamma\": 1 },\n{ \"gamma\": 2 } ] }, "));
+  ASSERT_FALSE(in_sweep.empty());
+  EXPECT_EQ(in_sweep[0].pointer, "/sweep/points/1/gamma");
+  EXPECT_EQ(in_sweep[0].at.line, 3);
 }
 
 // A file that is no recipe has a problem in every line: after 1000 the rest is left alone.
