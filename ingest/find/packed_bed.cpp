@@ -34,9 +34,10 @@ constexpr double most_misfit_of_lit = 2;
 // Lit disks that do not touch are beads where circles show a good part of them, where noise is so small a share of the
 // contrast that other shapes would leave more than it, and where their lit rim is that circle. Drawn spheres: rms
 // 0.001 to 0.005 radii, radius 0.956 to 0.994, offset up to 0.02; ellipses of 0.93 and 0.8: 0.009 to 0.011 and 0.028
-// to 0.033; squares with round corners 0.04.
+// to 0.033; squares with round corners and hexagons 0.04. Neighbours that touch disturb: up to 0.008.
 constexpr double least_shown = 0.3, most_noise = 0.06;
-constexpr double round_lit_rim = 0.008, least_lit_rim = 0.93, most_lit_rim = 1.03, most_lit_offset = 0.04;
+constexpr double round_lit_rim = 0.006, round_in_a_bed = 0.012, least_lit_rim = 0.93, most_lit_rim = 1.03,
+                 most_lit_offset = 0.04;
 constexpr double same_as_circle = 0.4;
 constexpr double smallest_px = 3;  // smaller disks are specks
 constexpr int part_px = 400;
@@ -98,7 +99,8 @@ bool is_small(const PackedBed& bed) {
 
 bool Packing::describes() const {
   const bool touch = touching >= least_touching && misfit <= (lit ? most_misfit_of_lit : most_misfit);
-  const bool are_shown = lit && round && shown >= least_shown && noise <= most_noise && misfit <= most_misfit;
+  const bool are_shown =
+      lit && unevenness <= round_lit_rim && shown >= least_shown && noise <= most_noise && misfit <= most_misfit;
   return disks >= fewest_disks && overlapping <= most_overlapping && unexplained <= most_unexplained &&
          (touch || are_shown);
 }
@@ -148,13 +150,15 @@ double share_shown(const std::vector<FoundDisk>& disks, const Places& circles, d
   return static_cast<double>(shown) / std::max(1.0, static_cast<double>(disks.size()));
 }
 
-// Whether the lit rims of these disks, of this radius, are their circle.
-bool lit_rims_are_round(const GrayFrame& frame, const std::vector<FoundDisk>& disks, const FinderCalibration& faces) {
+// How far the lit rims of these disks are from their circle: rms, radii. Infinitely far where it is another circle.
+double unevenness_of_lit_rims(const GrayFrame& frame, const std::vector<FoundDisk>& disks,
+                              const FinderCalibration& faces) {
   const auto rim = lit_rim_of(frame, circles_of(disks), faces.polarity);
-  if (!rim) return false;
+  if (!rim) return HUGE_VAL;
   const double radius = faces.radius_px, ratio = rim->radius_px / radius;
-  return rim->rms_radii <= round_lit_rim && ratio >= least_lit_rim && ratio <= most_lit_rim &&
-         std::hypot(rim->right_px, rim->down_px) <= most_lit_offset * radius;
+  const bool same = ratio >= least_lit_rim && ratio <= most_lit_rim &&
+                    std::hypot(rim->right_px, rim->down_px) <= most_lit_offset * radius;
+  return same ? rim->rms_radii : HUGE_VAL;
 }
 
 }  // namespace
@@ -168,7 +172,7 @@ PackedBed packed_bed_of(CalibrationResult faces, const std::vector<const GrayFra
   bed.packing = packing_of(*frames.back(), found, bed.faces.calibration);
   bed.packing.shown = share_shown(found.disks, circles, bed.faces.calibration.radius_px);
   if (bed.packing.lit && bed.packing.shown > 0)
-    bed.packing.round = lit_rims_are_round(*frames.back(), found.disks, bed.faces.calibration);
+    bed.packing.unevenness = unevenness_of_lit_rims(*frames.back(), found.disks, bed.faces.calibration);
   bed.disks = std::move(found.disks);
   if (!bed.packing.describes()) {
     bed.faces.found = false;
@@ -246,6 +250,7 @@ std::optional<PackedBed> look_for_lit_bed(const GrayFrame& frame, const PackedSt
   for (auto& [x, y] : places) x = (x + 0.5) / reduction - 0.5, y = (y + 0.5) / reduction - 0.5;
   PackedBed bed = learn_packed_bed({&small}, find, places);
   if (!bed.faces.found || bed.faces.calibration.radius_px < smallest_px) return std::nullopt;
+  if (bed.packing.unevenness > round_in_a_bed) return std::nullopt;  // hexagonal nuts touch as well
   bed.reduction = reduction;
   bed.reduced_frame = std::move(small);
   return bed;

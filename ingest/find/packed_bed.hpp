@@ -6,6 +6,7 @@
 // to its noise. Nothing else than touching disks does both: leave no more than noise, and fit disks whose
 // neighbours lie one fitted diameter away.
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,7 +28,8 @@ struct Packing {
   double noise = 0;        // over the contrast
   double shown = 0;        // share of the disks that a circle shows as well, where circles are known
   bool lit = false;        // the model of a disk is brighter on one side
-  bool round = false;      // the rim on that side is the circle of the disks, where circles are known
+  // Rms distance of the rim on that side from the circle of the disks, radii, where circles are known.
+  double unevenness = HUGE_VAL;
   // Disks that touch, or lit ones that circles show, and what is beside them; and these lie close.
   [[nodiscard]] bool describes() const;
   [[nodiscard]] bool convinces() const;
