@@ -250,7 +250,7 @@ std::optional<PackedBed> look_for_lit_bed(const GrayFrame& frame, const PackedSt
   for (auto& [x, y] : places) x = (x + 0.5) / reduction - 0.5, y = (y + 0.5) / reduction - 0.5;
   PackedBed bed = learn_packed_bed({&small}, find, places);
   if (!bed.faces.found || bed.faces.calibration.radius_px < smallest_px) return std::nullopt;
-  if (bed.packing.unevenness > round_in_a_bed) return std::nullopt;  // hexagonal nuts touch as well
+  if (bed.packing.unevenness > round_in_a_bed) return std::nullopt;  // nuts and ovals touch as well
   bed.reduction = reduction;
   bed.reduced_frame = std::move(small);
   return bed;

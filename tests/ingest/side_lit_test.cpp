@@ -8,6 +8,7 @@
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/lit_rim.hpp"
 #include "ingest/find/missed_beads.hpp"
+#include "ingest/find/packed_bed.hpp"
 #include "ingest/profile/bed_geometry.hpp"
 #include "ingest/profile/film_calibration.hpp"
 #include "ingest/profile/photographs.hpp"
@@ -201,6 +202,24 @@ TEST(SideLitSpheres, AreNoOvals) {
   const BedFound found = measured(drawn(gas_of(110, 20, 4), {10, 0.35, 0.83, 30, 30, 0, 0.85}, 8));
   ASSERT_FALSE(found.ok());
   EXPECT_EQ(found.status, FindStatus::no_beads) << found.message;
+}
+
+// A crystal seen too low: four of six neighbours are one fitted diameter away, and faces describe it. Only the rims
+// tell.
+TEST(SideLitSpheres, AreNoOvalsThatTouch) {
+  const Look look{14, 0.353, 0.83, 40, 30, 0, 0.88};
+  sim::Snapshot bed = layer_of(9, 1, 3);
+  for (double& z : bed.z) z *= look.flatness;
+  const GrayFrame frame = drawn(bed, look, 8);
+  Places middles;
+  for (std::size_t k = 0; k < bed.x.size(); ++k)
+    middles.emplace_back(29.5 + bed.x[k] * 2 * look.radius_px, frame.height - 30 - bed.z[k] * 2 * look.radius_px);
+  FindOptions find;
+  find.polarity = Polarity::bright_beads, find.radius_px = 0.92 * look.radius_px;
+  const PackedBed all = learn_packed_bed({&frame}, find, middles);
+  EXPECT_TRUE(all.faces.found && all.packing.touching > 0.5 && all.packing.lit);
+  EXPECT_NEAR(all.packing.unevenness, 0.016, 0.003);
+  EXPECT_FALSE(look_for_packed_bed(frame, {{find.polarity, find.radius_px, middles}}));
 }
 
 // Circles through parts of the spheres: too small, and shifted towards the light.

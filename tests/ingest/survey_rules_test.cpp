@@ -63,8 +63,7 @@ Thought thought_of(const LearnedRims& rims, bool given) {
   out.wrong = count > 0 ? doubts / count : 1;
   const double at_worst = (doubts + std::sqrt(doubts)) / std::max(1.0, count);
   const double asked = std::min(0.9, 0.42 + (given ? 0.5 : 1) * 3.5 / std::max(1.0, count));
-  const bool lit = count >= 20 && ((support >= 0.6 * count && out.explained >= 0.4 && at_worst <= 0.02) ||
-                                   (given && out.explained >= 0.25));
+  const bool lit = count >= 20 && support >= 0.6 * count && out.explained >= 0.4 && at_worst <= 0.02;
   if (count == 0)
     out.why_not = "no circles are seen";
   else if (at_worst > 0.2 || (!given && at_worst > 0.1 && out.explained < 0.15))
