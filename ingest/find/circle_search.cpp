@@ -564,11 +564,20 @@ Circle in_the_frame(Circle circle, const ScaledPicture& at) {
   return circle;
 }
 
+Circle in_reduced_frame(Circle circle, int reduction) {
+  circle.x = (circle.x + 0.5) / reduction - 0.5;
+  circle.y = (circle.y + 0.5) / reduction - 0.5;
+  circle.radius /= reduction;
+  return circle;
+}
+
 Places places_of(const std::vector<Circle>& circles, int reduction) {
   Places places;
   places.reserve(circles.size());
-  for (const Circle& circle : circles)
-    places.emplace_back((circle.x + 0.5) / reduction - 0.5, (circle.y + 0.5) / reduction - 0.5);
+  for (const Circle& circle : circles) {
+    const Circle there = in_reduced_frame(circle, reduction);
+    places.emplace_back(there.x, there.y);
+  }
   return places;
 }
 

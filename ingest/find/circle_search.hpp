@@ -25,7 +25,8 @@ struct Circle {
 // px of the picture; px of the frame that it shows.
 Circle on_the_map(Circle circle, const ScaledPicture& at);
 Circle in_the_frame(Circle circle, const ScaledPicture& at);
-// Their centres, px of a frame that is reduced by averaging (frames/smooth_field.hpp).
+// Px of a frame that is reduced by averaging (frames/smooth_field.hpp); and the centres there.
+Circle in_reduced_frame(Circle circle, int reduction);
 Places places_of(const std::vector<Circle>& circles, int reduction = 1);
 
 // Ratio of the axes of the stretched copies that tell what chance makes up: no bead's rim is round any more, textures

@@ -4,27 +4,28 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "ingest/calibrate/solid_borders.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-constexpr int ray_count = 64, ray_steps = 128;  // of the polar picture
-constexpr double ray_reach = 1.6;               // radii of the circles, to which it goes
-constexpr double nearest_steep = 0.7, farthest_steep = 1.5;
-constexpr double ray_smoothing = 0.04;       // radii
-constexpr std::size_t enough_circles = 400;  // enough for the mean
-constexpr double steep_from = 0.5;           // of the steepest edge
+constexpr int ray_count = 64, ray_steps = 128;               // of the polar picture
+constexpr double ray_reach = 1.6;                            // radii of the circles, to which it goes
+constexpr double nearest_steep = 0.7, farthest_steep = 1.5;  // radii of the circles, between which edges are looked for
+constexpr double ray_smoothing = 0.04;                       // radii
+constexpr std::size_t enough_circles = 400;                  // enough for the mean
+constexpr double steep_from = 0.5;                           // of the steepest edge
 constexpr int fewest_steep = ray_count / 3;
 constexpr double most_uneven = 0.05;  // radii, rms of the steep edges about their circle
 
 double typical_radius(const std::vector<Circle>& circles) {
   std::vector<double> radii;
   for (const Circle& circle : circles) radii.push_back(circle.radius);
-  std::nth_element(radii.begin(), radii.begin() + std::ssize(radii) / 2, radii.end());
-  return radii[radii.size() / 2];
+  return median_of(std::move(radii));
 }
 
 // Level along rays from the centre, the mean of the circles whose surroundings are in view.
@@ -51,7 +52,8 @@ cv::Mat mean_rays(const GrayFrame& frame, const std::vector<Circle>& circles, do
 }
 
 struct SteepEdge {
-  double x = 0, y = 0, slope = 0;
+  double x = 0, y = 0;  // px from the centre of the circles
+  double slope = 0;     // grey levels per step along the ray
 };
 
 // The steepest edge along each ray.
@@ -76,7 +78,8 @@ std::vector<SteepEdge> steepest_edges(const cv::Mat& rays, double step_px, doubl
   return edges;
 }
 
-// Least squares: x^2 + y^2 = 2 a x + 2 b y + c, each edge weighted by its slope.
+// The circle x^2 + y^2 = 2 a x + 2 b y + c by least squares, each edge weighted by its slope. Middle: (a, b); radius:
+// sqrt(c + a^2 + b^2).
 std::optional<LitRim> circle_through(const std::vector<SteepEdge>& edges) {
   cv::Matx33d normal = cv::Matx33d::zeros();
   cv::Vec3d right(0, 0, 0), solved;

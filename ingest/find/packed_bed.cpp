@@ -38,8 +38,8 @@ constexpr double most_misfit_of_lit = 2;
 constexpr double least_shown = 0.3, most_noise = 0.06;
 constexpr double round_lit_rim = 0.006, round_in_a_bed = 0.012, least_lit_rim = 0.93, most_lit_rim = 1.03,
                  most_lit_offset = 0.04;
-constexpr double same_as_circle = 0.4;
-constexpr double smallest_px = 3;  // smaller disks are specks
+constexpr double same_as_circle = 0.4;  // radii
+constexpr double smallest_px = 3;       // smaller disks are specks
 constexpr int part_px = 400;
 // Radii: half the distance of neighbours that may be parts of disks that touch.
 constexpr double nearest_apart = 1.05, farthest_apart = 1.3;
@@ -260,14 +260,14 @@ std::optional<PackedBed> look_for_lit_bed(const GrayFrame& frame, const PackedSt
 
 std::optional<PackedBed> look_for_packed_bed(const GrayFrame& frame, const std::vector<PackedStart>& starts) {
   std::optional<GrayFrame> part;
-  if (std::max(frame.width, frame.height) > part_px)
-    part = cut_out(frame, busiest_part(frame, part_px, {.block = 16, .reach = 2, .stride = 2}));
   for (const PackedStart& start : starts) {
     if (!start.lit.empty()) {
       if (auto bed = look_for_lit_bed(frame, start)) return bed;
       continue;
     }
     if (start.radius_px && (*start.radius_px < smallest_px || *start.radius_px > largest_packed_px)) continue;
+    if (!part && std::max(frame.width, frame.height) > part_px)
+      part = cut_out(frame, busiest_part(frame, part_px, {.block = 16, .reach = 2, .stride = 2}));
     FindOptions find;
     find.polarity = start.polarity;
     find.radius_px = start.radius_px;

@@ -1,10 +1,11 @@
 #pragma once
-// Beads that lie close, found by their faces alone.
+// Beads that lie close, or are lit from one side, found by their faces.
 //
 // Where small beads touch, their rims show only in the voids between them, and blur moves what shows inwards: circles
 // through these rims are too small, or no circles. The joint fit of all faces (find_disks.hpp) describes such a picture
 // to its noise. Nothing else than touching disks does both: leave no more than noise, and fit disks whose
-// neighbours lie one fitted diameter away.
+// neighbours lie one fitted diameter away. Spheres lit from one side need not touch: circles show a part of them, and
+// their lit rims (lit_rim.hpp) whether they are round.
 
 #include <cmath>
 #include <optional>

@@ -260,13 +260,6 @@ void enlarge(SurveyCandidate& candidate, int factor) {
   }
 }
 
-// Px of a frame that is reduced by averaging.
-Circle in_reduced(Circle circle, int factor) {
-  circle.x = (circle.x + 0.5) / factor - 0.5, circle.y = (circle.y + 0.5) / factor - 0.5;
-  circle.radius /= factor;
-  return circle;
-}
-
 // Share of the edges that are gone once the beads are taken out, and their length.
 void explain_edges(SurveyCandidate& candidate, const GrayFrame& frame, const PackedBed& bed) {
   FindResult found;
@@ -311,7 +304,7 @@ bool leaves_room(const SurveyCandidate& candidate, int reduction) {
 std::optional<PackedStart> lit_start(const SurveyCandidate& candidate, const GrayFrame& frame, int reduction) {
   if (candidate.disks.size() < fewest_lit) return std::nullopt;
   std::vector<Circle> circles = circles_of(candidate.disks);
-  for (Circle& circle : circles) circle = in_reduced(circle, reduction);
+  for (Circle& circle : circles) circle = in_reduced_frame(circle, reduction);
   const auto rim = lit_rim_of(frame, circles, candidate.rims.polarity);
   const bool lit = rim && rim->steep < steep_all_round && rim->rms_radii < nearly_round;
   const bool one_sided = candidate.plausible && candidate.why_not == one_side_missing;
@@ -359,8 +352,8 @@ struct SurveyedPicture {
   const DrawingSigns& signs;
 };
 
-// Beads that lie close, by their faces, come first where they explain more than circles do, or are as many: of circles
-// that leave room and beads that touch, only these describe the picture.
+// Beads that lie close, or are lit from one side, by their faces. They come first where they explain more than circles
+// do, or are as many: of circles that leave room, or show a part of a bead, and beads, only these describe the picture.
 void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const CircleCensus& census,
                          const SurveyOptions& options) {
   std::vector<PackedStart> starts = lit_starts(survey, picture.frame, picture.channel, picture.reduction);
@@ -369,6 +362,7 @@ void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const C
     starts.insert(starts.end(), others.begin(), others.end());
   }
   if (!survey.found && !options.radius_px) starts.push_back({options.polarity, std::nullopt});
+  if (starts.empty()) return;
   const std::optional<PackedBed> bed = look_for_packed_bed(picture.frame, starts);
   if (!bed) return;
   SurveyCandidate candidate = candidate_of(*bed, bed->reduction > 1 ? bed->reduced_frame : picture.frame);

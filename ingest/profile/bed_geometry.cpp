@@ -21,8 +21,7 @@ constexpr double fair_scale = 0.02;
 // Of the radius of beads lit from one side: three kinds of drawn spheres were off by 0.25 to 0.5 %, of which what is
 // stated besides is a half.
 constexpr double one_sided_light = 0.002;
-// The same where the dark side hides a part of the rim: 12 drawn gases of spheres were off by 1.5 % (rms; 0.8 to 2.9
-// %).
+// The same where the dark side hides a part of the rim: 12 drawn gases of spheres were off by 0.8 to 2.9 %, rms 1.5 %.
 constexpr double hidden_rim = 0.015;
 // Errors, within which the circles seen and the distance of touching beads agree. A distance that is larger by more
 // than the second factor is that of beads that do not touch (bed_doubts.hpp).

@@ -204,8 +204,8 @@ TEST(SideLitSpheres, AreNoOvals) {
   EXPECT_EQ(found.status, FindStatus::no_beads) << found.message;
 }
 
-// A crystal seen too low: four of six neighbours are one fitted diameter away, and faces describe it. Only the rims
-// tell.
+// Ovals in rows as close: four of six neighbours are one fitted diameter away, and faces describe them. Only the rims
+// tell that they are no disks.
 TEST(SideLitSpheres, AreNoOvalsThatTouch) {
   const Look look{14, 0.353, 0.83, 40, 30, 0, 0.88};
   sim::Snapshot bed = layer_of(9, 1, 3);
