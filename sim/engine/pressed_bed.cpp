@@ -463,11 +463,7 @@ auto PressedBed::add_wall_forces(const std::vector<std::uint32_t>& near, Wall wa
     contacts.lost += one.lost;
     if (!(spring.grip.friction > 0)) continue;  // of smooth disks none has any
     double& stretch = wall_stretch_[walls * disk_of_[i] + wall];
-    if (one.force == 0) {
-      if (stretch != 0) rubbed_ += 0.5 * spring.grip.stiffness * stretch * stretch;
-      stretch = 0;
-      continue;
-    }
+    if (one.force == 0 && stretch == 0) continue;  // apart, and nothing to let go
     const TwoLanes tangent = {inward[1], -inward[0]};
     const TwoLanes now = velocity_of(i) * tangent, past = TwoLanes{halfway_x_[i], halfway_z_[i]} * tangent;
     const Pulled side =

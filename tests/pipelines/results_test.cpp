@@ -13,6 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace shakebed::tests;
 using shakebed::pipelines::Json;
+using shakebed::pipelines::read_json;
 using testing::HasSubstr;
 
 const fs::path source = SHAKEBED_SOURCE_DIR;

@@ -225,6 +225,38 @@ TEST(PressedRoughByHand, IsBrakedAndSpunUpByEachWall) {
   }
 }
 
+// Of five disks in flight, which fill one block of four and begin another: the root of the largest square, and means
+// over all. Against a floor that moves, rims included, each eight steps.
+TEST(PressedRoughByHand, KnowsHowFastItsDisksAre) {
+  constexpr double step = 1e-3;
+  constexpr FloorMotion::Motion floor{0, 0.25, 0};
+  struct Disk {
+    double vx, vz, spin;
+  };
+  const std::vector<Disk> disks{{0.3, 0.1, 0.2}, {-0.1, -0.2, 1.8}, {0, 0.4, 0}, {0.2, 0, -0.6}, {-0.4, 0.3, 0.4}};
+  std::vector<PressedBed::State> states;
+  std::vector<double> spins;
+  double largest = 0, squares = 0, side_squares = 0;
+  for (const Disk& disk : disks) {
+    states.push_back({1.5 + 1.7 * static_cast<double>(states.size()), 15, disk.vx, disk.vz});
+    spins.push_back(disk.spin);
+    const double up = disk.vz - PressedBed::steps_a_check * step - floor.velocity, rim = 0.5 * disk.spin;
+    const double square = disk.vx * disk.vx + up * up + rim * rim;
+    largest = std::max(largest, square);
+    squares += square;
+    side_squares += disk.vx * disk.vx;
+  }
+  PressedBed bed = elastic_bed({Surface{1, 0.1, 0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}}, inverse_ratio);
+  bed.begin(states, floor, lasts, spins);
+  for (std::uint32_t k = 0; k < PressedBed::steps_a_check; ++k) {
+    EXPECT_GT(bed.mean_square_speed(), 1e6) << "not before the check";
+    bed.step(floor, floor, step);
+  }
+  EXPECT_NEAR(bed.fastest(), std::sqrt(largest), 1e-12);
+  EXPECT_NEAR(bed.mean_square_speed(), squares / 5, 1e-12);
+  EXPECT_NEAR(bed.side_temperature(), side_squares / 5, 1e-12);
+}
+
 // Stiffness of a tangential spring: 1/(1 + 1/q) of pi^2 + ln(b)^2 over the contact time squared, b the tangential
 // restitution; half of it between two disks. Its energy counts as damped when it is let go.
 TEST(PressedRoughByHand, KeepsItsStretchedSpringsUntilTheyAreLetGo) {
