@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 
 #include "sim/engine/random.hpp"
 #include "sim/engine/simulation.hpp"
@@ -115,6 +117,32 @@ TEST(Baths, OnAThermalFloorThrow) {
   EXPECT_NEAR(at.vz[0], z - 1e-3, 1e-14);
   EXPECT_NEAR(simulation->energy().floor_work, (x * x + z * z - 1.25) / 2, 1e-14);
   EXPECT_NEAR(simulation->energy().imbalance(), 0, 1e-14);
+}
+
+// The temperature from now on, whichever the reservoir; a scene without one has none to set.
+TEST(Baths, TakeAnotherTemperature) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{1, 1, 1}};
+  scene.box.width = 20;
+  scene.bath = ThermalFloor{2};
+  scene.seed = 5;
+  scene.start = PlacedStart{{{10, 1, 0.5, 0, 0, 0}}};
+  const auto thermal = simulate(scene);
+  thermal->set_bath_temperature(8);
+  Random random(5 ^ bath_stream);
+  const double x = std::sqrt(8) * random.normal_pair().first;
+  EXPECT_NEAR(velocity_at(*thermal, 1 + 1e-3).x, x, 1e-14);
+  for (const double wrong : {0.0, -1.0, std::numeric_limits<double>::infinity(), std::nan("")})
+    EXPECT_THROW(thermal->set_bath_temperature(wrong), std::invalid_argument) << wrong;
+  const auto langevin = simulate(lone_disk(LangevinBath{1.5, 2, 0.1}, 1));
+  langevin->set_bath_temperature(6);
+  Random other(1 ^ bath_stream);
+  EXPECT_NEAR(velocity_at(*langevin, 0.15).x,
+              0.5 * std::exp(-0.2) + std::sqrt(6 * (1 - std::exp(-0.4))) * other.normal_pair().first, 1e-14);
+  EXPECT_THROW(simulate(lone_disk(WhiteNoiseBath{0.3, 0.1, false}, 3))->set_bath_temperature(2), std::invalid_argument)
+      << "it has a heating rate";
+  EXPECT_THROW(simulate(lone_disk({}, 3))->set_bath_temperature(2), std::invalid_argument);
 }
 
 // Disks of two masses: kicks go as 1/sqrt(m), and together they keep the momentum that they are to keep.

@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <random>
+#include <vector>
 
+#include "sim/measure/archive.hpp"
 #include "sim/measure/flow_free.hpp"
 
 namespace shakebed::sim::flow_free {
@@ -117,6 +120,26 @@ TEST(FlowFree, OfDisplacementsIsTheMeanOfPeriods) {
   observer.observe(placed(2, {1, 2, 3, 7}, z), 0);   // four times as much
   observer.observe(placed(3, {1, 2, 3, 10}, z), 1);  // nine times as much
   EXPECT_NEAR(observer.x().value, (0.25 + 0.25 * (4 + 9) / 2) / 2, 1e-12);
+}
+
+// Kept in the middle of a period, and taken up by another: the look before it counts.
+TEST(FlowFree, OfDisplacementsGoesOnFromWhatWasKept) {
+  const DiskProperties disks{std::vector<double>(4, 0.5), std::vector<double>(4, 1.0)};
+  const std::vector<double> z(4, 0.5), raised{0.5, 0.5, 0.5, 0.9};
+  FlowFreeDisplacement first(wide(HardSides{}), disks, 2), second(wide(HardSides{}), disks, 2);
+  first.observe(placed(0, {1, 2, 3, 4}, z), 0);
+  first.observe(placed(1, {1, 2, 3, 5}, z), 1);
+  first.observe(placed(3, {1, 2, 3, 9}, z), 0);
+  ArchiveWriter out;
+  out(first);
+  const std::vector<std::uint8_t> kept = out.take();
+  ArchiveReader in(kept);
+  in(second);
+  EXPECT_TRUE(in.at_end());
+  second.observe(placed(7, {1, 2, 3, 9.8}, raised), 1);
+  // Per unit of time the fourth disk moved by 1 in the first period, by 2 and 0.2 in the second, and by 0.1 upwards.
+  EXPECT_NEAR(second.x().value, (0.25 + 0.25 * (4 + 0.04) / 2) / 2, 1e-12);
+  EXPECT_NEAR(second.z().value, (0 + 0.25 * (0 + 0.01) / 2) / 2, 1e-12);
 }
 
 }  // namespace

@@ -222,6 +222,10 @@ TEST(Measure, TakesTheReservoirThroughItsSteps) {
   EXPECT_FALSE(measure(scene, schedule, {&first}, control).finished);
   EXPECT_TRUE(measure(scene, schedule, {&second}, {}, kept).finished);
   EXPECT_TRUE(equal_bytes(second.seen, whole.seen));
+  for (const std::vector<BathStep>& wrong : std::vector<std::vector<BathStep>>{{{8, 3}, {4, 0.5}}, {{8, 3}, {40, 1}}}) {
+    schedule.bath = wrong;
+    EXPECT_THROW(measure(scene, schedule, {}), std::invalid_argument);
+  }
   schedule.bath = {};
   Diary without;
   measure(scene, schedule, {&without});

@@ -1,5 +1,6 @@
 // What a scene is allowed to be, on both sides of every limit; where disks begin, by pencil; reservoirs of disks that
 // are not of mass 1; rows and columns that lock.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -405,6 +406,17 @@ TEST(StartByHand, FillsItsHeightAtRandom) {
   scene = weightless(40, 30);
   scene.disks.species[0].count = 400;
   expect(0, 0, 40, 0, 30);
+}
+
+// Disks placed at random one after the other jam at a covered fraction of 0.547: 0.65 cannot be filled so.
+TEST(StartByHand, FillsNoMoreThanOneAfterTheOtherCan) {
+  Scene scene = weightless(20, 20);
+  scene.start = RandomStart{};
+  scene.disks.species[0].count = 230;
+  EXPECT_EQ(place_disks(scene).size(), 230U) << "0.45 of the area";
+  scene.disks.species[0].count = 331;
+  EXPECT_THAT([&] { place_disks(scene); },
+              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("no place for a disk after 20,000 attempts")));
 }
 
 // Every limit of a place, one disk of 2 D: 1e-12 of the width and 1e-12 D are rounding.
