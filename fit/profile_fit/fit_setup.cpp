@@ -45,15 +45,10 @@ FitStatus check_numbers(const FitOptions& options, const FitModel& model, FitRes
 
 bool is_whole_column(const FitOptions& options) { return options.model.starts_with("hydrostatic:"); }
 
-FitStatus check_plateau(const FitOptions& options, const FitModel& model, FitResult& result) {
+FitStatus check_plateau(const FitOptions& options, FitResult& result) {
   if (options.plateau_density > close_packing_density * (1.0 + rounding)) {
     result.message = "the plateau density " + number(options.plateau_density, 5) +
                      " is above close packing, 2/sqrt 3 = 1.1547, which hard disks cannot exceed";
-    return FitStatus::undefined_model;
-  }
-  if (!is_whole_column(options) && options.plateau_density > model.largest_plateau() * (1.0 + rounding)) {
-    result.message = "the equation of state has no value at the plateau density " + number(options.plateau_density, 5) +
-                     ". Give a lower plateau density or choose another model";
     return FitStatus::undefined_model;
   }
   return FitStatus::ok;
@@ -93,7 +88,7 @@ FitStatus make_model(const FitOptions& options, double resolution, std::unique_p
   model = make_fit_model(options.model, options.base, options.constrain_column, resolution);
   if (!model) return bad_input(result, "there is no model named '" + options.model + "'");
   const FitStatus status = check_numbers(options, *model, result);
-  return status == FitStatus::ok ? check_plateau(options, *model, result) : status;
+  return status == FitStatus::ok ? check_plateau(options, result) : status;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/fit/reference_values.hpp"
 
@@ -101,6 +102,12 @@ TEST(Expansion, HasAStatusAtPolesAndOutsideRanges) {
   EXPECT_EQ(expansion_constants(enskog(), 0.0).status, ValueStatus::invalid_argument);
   EXPECT_EQ(expansion_constants(enskog(), -1.0).status, ValueStatus::invalid_argument);
   EXPECT_EQ(expansion_constants(enskog(), 1.3).status, ValueStatus::outside_range);
+  const Column column{11.22, 1.1};
+  for (const double wrong : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(hydrostatic_center_of_mass_rise(enskog(), column, wrong).status, ValueStatus::invalid_argument);
+    EXPECT_EQ(hydrostatic_center_of_mass_rise(enskog(), {wrong, 1.1}, 0.1).status, ValueStatus::invalid_argument);
+  }
+  EXPECT_EQ(hydrostatic_center_of_mass_rise(enskog(), column, 0).value, 0) << "at rest";
 }
 
 TEST(Expansion, ConstantsNearAPoleAreStillResolved) {

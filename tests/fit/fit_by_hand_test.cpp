@@ -276,6 +276,8 @@ TEST(FitMistakes, OfOptionsAreNamed) {
     change(options);
     FitResult result;
     EXPECT_EQ(check_options(options, result), expected) << result.message;
+    const std::vector<std::string> said = options.validate();
+    EXPECT_EQ(said, expected == FitStatus::ok ? std::vector<std::string>{} : std::vector{result.message});
     return result.message;
   };
   const auto nothing = [](FitOptions&) {};
@@ -557,6 +559,14 @@ TEST(ObjectionsByHand, CountHeightsAndUnits) {
   EXPECT_THAT(objections(bed, 3.6 * 1.51), ElementsAre("The area under the profile is 3.6, but N D/W is 5.44."));
 }
 
+TEST(ObjectionsByHand, NameDensitiesBelowZero) {
+  EXPECT_THAT(objections(stairs({1, 1, 0.8, 0.5, 0.2, 0.1, -3.5}, 0.001)),
+              testing::Not(testing::Contains(HasSubstr("negative, on average"))));
+  EXPECT_THAT(objections(stairs({1, 1, 0.8, 0.5, 0.2, 0.1, -3.7}, 0.001)),
+              ElementsAre("The densities are negative, on average."));
+  EXPECT_TRUE(objections(stairs({-1, -1, 0, 0, -1, -1, -1}, 0.001)).empty()) << "no signal, as fits say";
+}
+
 // Errors of one height a diameter: half of the density, in the median of what is denser than half of the greatest.
 TEST(ObjectionsByHand, WeighErrors) {
   Profile profile = stairs({0.9, 0.9, 1, 0.45, 0.2, 0.1, 0}, 0.001);
@@ -758,6 +768,30 @@ TEST(SweepByHand, LeavesOutWindowsOfTooFewHeights) {
   }
   EXPECT_GT(just_too_few, 0);
   EXPECT_GT(just_enough, 0);
+}
+
+TEST(FitTextByHand, NamesEveryStatus) {
+  using enum FitStatus;
+  const std::pair<FitStatus, const char*> fits[] = {{ok, "ok"},
+                                                    {not_converged, "not converged"},
+                                                    {bad_input, "bad input"},
+                                                    {too_few_bins, "too few bins"},
+                                                    {no_signal, "no signal"},
+                                                    {no_tail, "no tail"},
+                                                    {unresolved_temperature, "unresolved temperature"},
+                                                    {undefined_model, "undefined model"},
+                                                    {unreadable, "unreadable"}};
+  for (const auto& [status, name] : fits) EXPECT_EQ(to_string(status), name);
+  const std::pair<ValueStatus, const char*> values[] = {{ValueStatus::ok, "ok"},
+                                                        {ValueStatus::pole, "undefined (pole)"},
+                                                        {ValueStatus::outside_range, "outside range"},
+                                                        {ValueStatus::invalid_argument, "invalid argument"},
+                                                        {ValueStatus::not_converged, "not converged"}};
+  for (const auto& [status, name] : values) {
+    EXPECT_EQ(to_string(status), name);
+    EXPECT_EQ(no_value(status).value, 0);
+    EXPECT_EQ(no_value(status).ok(), status == ValueStatus::ok);
+  }
 }
 
 TEST(FitTextByHand, SaysWhatAFitFound) {

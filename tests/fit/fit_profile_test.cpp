@@ -688,6 +688,24 @@ TEST(FitHardCases, PlateauAtTheSingularityHasAStatus) {
   EXPECT_EQ(fit.critical_temperature.value, 0.0);
 }
 
+TEST(FitHardCases, ACurveThatIsNotDefinedHasAStatus) {
+  const std::vector<double> heights{1, 2, 3};
+  const auto curve = [&](const FitOptions& options, double temperature, double plateau) {
+    return evaluate_model(options, temperature, 2, plateau, 0, heights);
+  };
+  FitOptions options;
+  EXPECT_EQ(curve(options, 0.2, 1.0).status, FitStatus::ok);
+  EXPECT_EQ(curve(options, 0.2, 1.0).densities.size(), 3U);
+  EXPECT_EQ(curve(options, -0.2, 1.0).status, FitStatus::undefined_model);
+  EXPECT_EQ(curve(options, 0.2, 1.3).status, FitStatus::undefined_model) << "beyond the pole of Enskog's equation";
+  EXPECT_TRUE(curve(options, 0.2, 1.3).densities.empty());
+  options.kernel = {KernelKind::gaussian, -1};
+  EXPECT_EQ(curve(options, 0.2, 1.0).status, FitStatus::bad_input);
+  options = {};
+  options.model = "gauss";
+  EXPECT_EQ(curve(options, 0.2, 1.0).status, FitStatus::bad_input);
+}
+
 TEST(FitHardCases, HeightsInTheWrongUnitAreNoticed) {
   for (const double unit : {2.99, 2.99e-3, 16.0}) {  // mm, m, px for a disk of 2.99 mm
     Profile data = good_profile();

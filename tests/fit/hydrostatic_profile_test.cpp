@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -316,6 +317,30 @@ TEST(HydrostaticProfile, GivesAStatusForNonsense) {
   EXPECT_EQ(HydrostaticProfile::tail_over_rectangle(best_of(), 0.1, 4.0, close_packing_density).status(),
             ValueStatus::pole);
   EXPECT_EQ(HydrostaticProfile::of_column(enskog(), -1.0, {11.22, 1.10}).density(1.0), 0.0);
+  const auto tail = [](double temperature, double shift, double plateau, double base) {
+    return HydrostaticProfile::tail_over_rectangle(enskog(), temperature, shift, plateau, base).status();
+  };
+  const auto column = [](double temperature, const Column& of, double base) {
+    return HydrostaticProfile::of_column(enskog(), temperature, of, base).status();
+  };
+  using enum ValueStatus;
+  EXPECT_EQ(tail(0.1, 4, 1.1, 0), ok);
+  EXPECT_EQ(column(0.1, {11.22, 1.1}, 0), ok);
+  for (const double wrong : {std::numeric_limits<double>::infinity(), std::nan("")}) {
+    EXPECT_EQ(tail(wrong, 4, 1.1, 0), invalid_argument);
+    EXPECT_EQ(tail(0.1, wrong, 1.1, 0), invalid_argument);
+    EXPECT_EQ(tail(0.1, 4, 1.1, wrong), invalid_argument);
+    EXPECT_EQ(column(wrong, {11.22, 1.1}, 0), invalid_argument);
+    EXPECT_EQ(column(0.1, {wrong, 1.1}, 0), invalid_argument);
+    EXPECT_EQ(column(0.1, {11.22, 1.1}, wrong), invalid_argument);
+  }
+  for (const double wrong : {0.0, -1.0, std::nan("")}) {
+    EXPECT_EQ(tail(0.1, 4, wrong, 0), invalid_argument);
+    EXPECT_EQ(column(0.1, {11.22, wrong}, 0), invalid_argument);
+    EXPECT_EQ(column(0.1, {wrong, 1.1}, 0), invalid_argument);
+  }
+  EXPECT_EQ(tail(-0.1, 4, 1.1, 0), invalid_argument);
+  EXPECT_EQ(column(-0.1, {11.22, 1.1}, 0), invalid_argument);
 }
 
 }  // namespace
