@@ -17,16 +17,6 @@
 
 namespace shakebed::ingest {
 
-GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder) {
-  GrayFrame left = residual_frame(frame, found, finder);
-  const LightField& light = finder.light;
-  const float background =
-      light.background[static_cast<std::size_t>(light.rows / 2) * static_cast<std::size_t>(light.columns) +
-                       static_cast<std::size_t>(light.columns / 2)];
-  for (float& level : left.pixels) level += background;
-  return left;
-}
-
 BothKinds find_both_kinds(const GrayFrame& frame, const FilmCalibration& film, const FindOptions& options) {
   const bool first_is_large = film.finder.radius_px > film.second->radius_px;
   const TwoKinds kinds = first_is_large ? TwoKinds{film.finder, *film.second} : TwoKinds{*film.second, film.finder};
@@ -48,8 +38,6 @@ constexpr double worth_it = 0.004, settled = 3e-4, most_bend = 0.25;
 constexpr double sigmas_of_aspect = 4, sigmas_of_radial = 5;
 // Of aspect and radial term: a smaller correction needs no new search for the beads.
 constexpr double small_correction = 0.01;
-// Of the expected radius: what is found by faces is the second species when it is nearer than this.
-constexpr double nearly_by_faces = 0.08;
 // Of a radius by votes, or by rims that blur has moved inwards.
 constexpr double radius_off = 0.07;
 
@@ -319,57 +307,14 @@ class FilmLearner {
 
   void learn_second() {
     const FinderCalibration& first = calibrated_.calibration;
-    if (find_.seen) {
-      film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
-      if (!film_.second) warn_of_no_second("no rims of this radius were found.");
-      return;
-    }
-    const double expected = first.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
-    std::vector<GrayFrame> painted;
-    for (const GrayFrame& frame : recorded_) {
-      const GrayFrame straight = straightened(frame);
-      painted.push_back(without_disks(straight, find_disks(straight, first, find_), first));
-    }
-    CalibrationResult result = learn_in_painted(painted, expected);
-    if (is_second(result, expected))
-      film_.second = std::move(result.calibration);
-    else
-      warn_of_no_second(result.found ? "the beads found have a radius of " +
-                                           std::to_string(result.calibration.radius_px * find_.recorded_px) +
-                                           " px, not " + std::to_string(expected * find_.recorded_px) + " px."
-                                     : result.why_not + ".");
+    film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
+    if (!film_.second) warn_of_no_second("no rims of this radius were found.");
   }
 
   void warn_of_no_second(const std::string& why) {
     film_.warnings.push_back(
         "No beads of the second diameter were found: " + why +
         (kinds_why_not_.empty() ? "" : " The search for both kinds together failed, too: " + kinds_why_not_ + "."));
-  }
-
-  static bool is_second(const CalibrationResult& one, double expected) {
-    return one.found && std::abs(one.calibration.radius_px / expected - 1) < nearly_by_faces;
-  }
-
-  // Several small disks can stand in for a large one: what is found with nothing asked for must not do better.
-  [[nodiscard]] CalibrationResult learn_in_painted(const std::vector<GrayFrame>& painted, double expected) const {
-    FindOptions find = find_;
-    find.polarity = Polarity::automatic;
-    find.radius_px = expected;
-    const std::vector<const GrayFrame*> pointers = pointers_to(painted);
-    CalibrationResult result = calibrate_finder(pointers, find);
-    if (!is_second(result, expected)) return result;
-    find.radius_px.reset();
-    const auto left_by = [&](const FinderCalibration& calibration) {
-      double square = 0;
-      for (const GrayFrame& frame : painted)
-        for (const float level : residual_frame(frame, find_disks(frame, calibration, find), calibration).pixels)
-          square += static_cast<double>(level * level);
-      return square;
-    };
-    CalibrationResult free = calibrate_finder(pointers, find);
-    if (free.found && !is_second(free, expected) && left_by(free.calibration) < left_by(result.calibration))
-      return free;
-    return result;
   }
 
   // Places asked for become those of the true frame.

@@ -37,7 +37,4 @@ struct BothKinds {
 };
 BothKinds find_both_kinds(const GrayFrame& frame, const FilmCalibration& film, const FindOptions& options);
 
-// The frame with the disks found painted over by the background behind them.
-GrayFrame without_disks(const GrayFrame& frame, const FindResult& found, const FinderCalibration& finder);
-
 }  // namespace shakebed::ingest

@@ -95,9 +95,7 @@ void FrameExaminer::find_disks_in(const GrayFrame& frame, FrameFindings& finding
 // Disks of the second species, none where the first has one.
 std::vector<FoundDisk> FrameExaminer::find_second(const GrayFrame& frame, const FindResult& found) const {
   const FinderCalibration &first = film_.finder, &second = *film_.second;
-  const FindOptions& options = film_.options.find;
-  std::vector<FoundDisk> disks = second.by_rims ? find_beads(frame, second, options).disks
-                                                : find_disks(without_disks(frame, found, first), second, options).disks;
+  std::vector<FoundDisk> disks = find_beads(frame, second, film_.options.find).disks;
   const double near = least_distance * (first.radius_px + second.radius_px);
   const Nearby taken(found.disks.size(), near,
                      [&](std::size_t i) { return std::pair(found.disks[i].x_px, found.disks[i].y_px); });

@@ -379,23 +379,6 @@ TEST(RadiusFromSeveralFrames, StaysWhereTheyTellNothingNew) {
 
 // --- film_calibration.hpp --------------------------------------------------------------------------------------------
 
-TEST(FilmCalibrated, HasNothingInThePlaceOfItsDisks) {
-  const std::vector<RenderedDisk> truth = strewn_disks(5, 4, 24, 9);
-  const GrayFrame frame = strewn_frame(truth, 132, 108);
-  FinderCalibration finder;
-  const FindResult found = find_disks(frame, {}, &finder);
-  const GrayFrame left = without_disks(frame, found, finder);
-  double sum = 0, squares = 0;
-  for (const float level : left.pixels) sum += static_cast<double>(level);
-  const double mean = sum / static_cast<double>(left.pixels.size());
-  for (const float level : left.pixels) squares += std::pow(static_cast<double>(level) - mean, 2);
-  EXPECT_NEAR(mean, 150, 0.3);
-  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(left.pixels.size())), 2, 0.4) << "the noise";
-  const std::size_t at =
-      static_cast<std::size_t>(std::lround(truth[7].y_px)) * 132 + static_cast<std::size_t>(std::lround(truth[7].x_px));
-  EXPECT_NEAR(left.pixels[at], 150, 8);
-}
-
 // Places given in a frame whose pixels are 1.1 times as wide as high are those of the true frame, which is stretched
 // from its left edge: column x is at 1.1 (x + 1/2) - 1/2 without the margin, rows stay.
 TEST(FilmCalibrated, TakesPlacesThroughItsLens) {

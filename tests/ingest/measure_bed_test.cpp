@@ -12,6 +12,7 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <random>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -627,6 +628,40 @@ TEST(MeasureBed, ASecondSpeciesIsRejectedUnlessAskedFor) {
         nearest = std::min(nearest, std::hypot(one.x_px - disk.x_px, one.y_px - disk.y_px));
     EXPECT_LT(nearest, 0.15) << disk.species << " at " << disk.x_px << " " << disk.y_px;
   }
+}
+
+// A polished floor: the lowest rows upside down below it, and fainter.
+TEST(MeasureBed, AMirrorImageIsLeftOut) {
+  constexpr double floor = 240;
+  SyntheticBed bed;
+  bed.left_wall_px = 12, bed.right_wall_px = 368, bed.floor_px = floor;
+  bed.radius_px = 8;
+  bed.rows = 3;
+  bed.gas_count = 40;
+  bed.gas_height_px = 120;
+  std::vector<RenderedDisk> beads = make_synthetic_bed(bed), images;
+  std::mt19937 random(5);
+  std::erase_if(beads, [&](const RenderedDisk& disk) { return disk.y_px < 10 || random() % 4 == 0; });
+  for (const RenderedDisk& disk : beads)
+    if (disk.y_px > floor - 50) images.push_back({disk.x_px, 2 * floor - disk.y_px, disk.radius_px});
+  Camera camera;
+  camera.width = 380, camera.height = 320;
+  camera.blur_px = 0.8;
+  camera.background_level = 200, camera.bead_level = 60;
+  camera.read_noise = 3;
+  GrayFrame frame = render_frame(beads, camera);
+  camera.bead_level = 110, camera.read_noise = 0;
+  const GrayFrame light = render_frame(images, camera);
+  for (std::size_t k = 0; k < frame.pixels.size(); ++k) frame.pixels[k] += light.pixels[k] - 200;
+  FrameSource source = FrameSource::from_frames({frame});
+  MeasureOptions options;
+  options.bead_diameter_m = 3e-3;
+  const Measurement found = measure_bed(source, options);
+  ASSERT_TRUE(found.above_mirror_image);
+  EXPECT_EQ(found.above_mirror_image->top, 0);
+  EXPECT_EQ(found.above_mirror_image->left, 0);
+  EXPECT_EQ(found.above_mirror_image->width, 380);
+  EXPECT_NEAR(found.above_mirror_image->height, floor, 1);
 }
 
 TEST(MeasureBed, TablesAndOverlayAreWritten) {

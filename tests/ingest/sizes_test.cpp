@@ -1,6 +1,7 @@
 // Beads of several sizes, beads whose rims are hidden by their neighbours, and colours that show faces where another
 // shows fringes; drawn.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -220,6 +221,38 @@ TEST(Sizes, ASecondDiameterThatNoBeadHasIsNotFound) {
     test::DrawnBed bed = test::bed_of_two_sizes(random, 1.4, 0, large_px);
     EXPECT_FALSE(measured_with(bed, {.ratio = 1.4, .large_first = large_first}).measurement.second_finder);
   }
+}
+
+// Beads with fringes, whose faces tell no kind: those of the second diameter are found by their rims.
+TEST(Sizes, BeadsOfTheSecondDiameterAreFoundByTheirRims) {
+  const std::vector<Bead> beads = scattered(27, {18, 18, 26}, 420, 360, 31);
+  ASSERT_EQ(beads.size(), 27U);
+  const GrayFrame frame = drawn(beads, 420, 360, 190, fringed_face, 7);
+  const ImageView view{.width = 420, .height = 360, .pixels = frame.pixels.data(), .type = PixelType::f32};
+  const auto measured = [&](double second_px) {
+    MeasureOptions options;
+    options.bead_diameter_m = 3e-3, options.second_diameter_m = 3e-3 * second_px / 18;
+    return measure_bed(std::vector<ImageView>{view}, options);
+  };
+  const BedFound found = measured(26);
+  ASSERT_TRUE(found.ok()) << found.message;
+  ASSERT_TRUE(found.measurement.second_finder);
+  EXPECT_NEAR(found.measurement.second_finder->radius_px, 26, 0.3);
+  EXPECT_EQ(found.measurement.disks.size(), 27U);
+  EXPECT_EQ(found.measurement.frames[0].second, 9U);
+  for (const MeasuredDisk& disk : found.measurement.disks)
+    EXPECT_TRUE(std::any_of(beads.begin(), beads.end(),
+                            [&](const Bead& bead) {
+                              return std::hypot(disk.x_px - bead.x, disk.y_px - bead.y) < 1 &&
+                                     (disk.species == 2) == (bead.radius > 20);
+                            }))
+        << disk.x_px << " " << disk.y_px << " " << disk.species;
+  const BedFound none = measured(38);
+  EXPECT_FALSE(none.measurement.second_finder);
+  EXPECT_THAT(none.measurement.warnings,
+              testing::Contains(testing::HasSubstr(
+                  "No beads of the second diameter were found: no rims of this radius were found. The search for both "
+                  "kinds together failed, too: ")));
 }
 
 // Coins: in the pictures of larger ones there are arcs of the radius that most have. A bead of that size is found there

@@ -1,6 +1,7 @@
 // Drawn imitations of strangers' photographs: beads are found whatever their faces look like, and where there are none
 // none are found.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <functional>
 #include <initializer_list>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <sstream>
 #include <string>
@@ -296,6 +298,96 @@ TEST(Survey, RingsInBeadsAreNoFurtherCandidates) {
 }
 
 // Beads of 10 and of 20 px. The radius that is given decides which are meant; one that no bead has finds none.
+// Things as wide as disks of this radius, with corners.
+bool in_square(const Place& place, double half, double x, double y) {
+  return std::abs(x - place.x) < half && std::abs(y - place.y) < half;
+}
+
+TEST(Survey, SmallSquaresAreRefusedWithWhatWouldHelpIfTheyWereBeads) {
+  const std::vector<Place> places = scattered(60, 19, 260, 220, 5);
+  const Survey survey = survey_of({{Channel::grey, painted(260, 220, [&](double x, double y) {
+                                      for (const Place& place : places)
+                                        if (in_square(place, 6, x, y)) return 60.0;
+                                      return 190.0;
+                                    })}});
+  ASSERT_FALSE(survey.found);
+  EXPECT_THAT(survey.why_not,
+              testing::AllOf(testing::HasSubstr("they have 4 corners"),
+                             testing::HasSubstr("blur alone can cause this for beads that touch: if these are beads, "
+                                                "photograph them at least 24 px wide")));
+}
+
+// With corners on a circle of this radius.
+bool in_polygon(const Place& place, int corners, double radius, double x, double y) {
+  const double right = x - place.x, down = y - place.y, part = 2 * std::numbers::pi / corners;
+  const double angle = std::atan2(down, right), from_middle = angle - part * (std::floor(angle / part) + 0.5);
+  return std::hypot(right, down) * std::cos(from_middle) < radius * std::cos(part / 2);
+}
+
+// Disks to the left, pentagons of about their size to the right.
+TEST(Survey, DisksAreFoundInThePartWhereThingsAreRound) {
+  const std::vector<Place> places = scattered(50, 46, 640, 300, 6);
+  std::vector<Place> disks, others;
+  for (const Place& place : places)
+    if (std::abs(place.x - 320) > 40) (place.x < 320 ? disks : others).push_back(place);
+  const BeadAt disk_at(disks, 20);
+  const Survey survey = survey_of({{Channel::grey, painted(640, 300, [&](double x, double y) {
+                                      if (disk_at(x, y) != nullptr) return 60.0;
+                                      for (const Place& place : others)
+                                        if (in_polygon(place, 5, 23, x, y)) return 60.0;
+                                      return 190.0;
+                                    })}});
+  expect_all(survey, disks, 20);
+  const std::optional<PixelRectangle>& region = survey.candidates.front().region;
+  ASSERT_TRUE(region);
+  EXPECT_EQ(region->left, 0);
+  EXPECT_EQ(region->top, 0);
+  EXPECT_EQ(region->height, 300);
+  EXPECT_NEAR(region->width, 320, 40);
+}
+
+// Bright hexagons everywhere, also on the dark plates whose rims are circles: most edges are those of the hexagons.
+TEST(Survey, PlatesAmongSmallerThingsThatAreNotRoundAreNoBeads) {
+  const std::vector<Place> plates = scattered(6, 110, 420, 360, 7);
+  std::vector<Place> hexagons = scattered(125, 19, 420, 360, 8);
+  std::erase_if(hexagons, [&](const Place& one) {
+    return std::any_of(plates.begin(), plates.end(), [&](const Place& plate) {
+      return std::abs(std::hypot(plate.x - one.x, plate.y - one.y) - 50) < 12;
+    });
+  });
+  const BeadAt plate_at(plates, 50), around(hexagons, 9);
+  const Survey survey = survey_of({{Channel::grey, painted(420, 360, [&](double x, double y) {
+                                      const Place* one = around(x, y);
+                                      if (one != nullptr && in_polygon(*one, 6, 9, x, y)) return 230.0;
+                                      return plate_at(x, y) != nullptr ? 60.0 : 150.0;
+                                    })}});
+  EXPECT_FALSE(survey.found);
+  EXPECT_TRUE(std::any_of(survey.candidates.begin(), survey.candidates.end(), [](const SurveyCandidate& one) {
+    return std::abs(one.rims.radius_px - 50) < 2 &&
+           one.why_not.starts_with(
+               "objects of 8.1 px radius that are not round explain more of the edges than circles "
+               "of 50.");
+  }));
+}
+
+// Spots that fade over their whole width, among bars.
+TEST(Survey, SpotsWithoutARimAmongOtherThingsAreNoBeads) {
+  const std::vector<Place> places = scattered(20, 40, 300, 220, 9);
+  const Survey survey = survey_of({{Channel::grey, painted(300, 220, [&](double x, double y) {
+                                      double level = 190;
+                                      for (const Place& place : places) {
+                                        const double dx = x - place.x, dy = y - place.y;
+                                        level -= 110 * std::exp(-(dx * dx + dy * dy) / (2 * 8 * 8));
+                                      }
+                                      return y > 200 || y < 20 ? level + 40 * (static_cast<int>(x / 6) % 2) : level;
+                                    })}});
+  EXPECT_FALSE(survey.found);
+  EXPECT_TRUE(std::any_of(survey.candidates.begin(), survey.candidates.end(), [](const SurveyCandidate& one) {
+    return one.disks.size() >= 10 && !one.plausible &&
+           one.why_not == "spots without a rim are seen, as in any blurred pattern";
+  }));
+}
+
 TEST(Survey, AGivenRadiusIsObeyedOrContradicted) {
   const std::vector<Place> places = scattered(50, 44, 520, 500, 4);
   std::vector<Place> small, large;
