@@ -1,5 +1,6 @@
 #include "ingest/profile/photographs.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -107,6 +108,40 @@ TEST(Photographs, AnImageThatCannotBeUsedIsNamed) {
   const BedFound bed = measure_bed(std::vector{view_of(good), view_of(frame)}, {.bead_diameter_m = 3e-3});
   EXPECT_EQ(bed.status, FindStatus::bad_input);
   EXPECT_EQ(bed.message, "frame 1: the image contains levels that are not finite numbers; replace them");
+}
+
+// Beads of 3 mm and 20 px: a pixel is 0.15 mm. Up to three times as much or as little is believed at first.
+TEST(Photographs, AScaleThatTheBeadsContradictIsRefused) {
+  const test::ScratchFolder folder;
+  write_png(folder / "bed.png", drawn(1));
+  const auto found = [&](double scale) {
+    return measure_bed({folder / "bed.png"}, {.bead_diameter_m = 3e-3, .scale_m_per_px = scale});
+  };
+  const BedFound wrong = found(0.5e-3);
+  EXPECT_EQ(wrong.status, FindStatus::bad_input);
+  EXPECT_THAT(wrong.message,
+              testing::ContainsRegex("bed.png: with the length of a pixel given .scale., a bead of 3 mm is 6 px wide, "
+                                     "but the circles found are (19[.]9|20|20[.]1) px wide. If they are the beads, a "
+                                     "pixel is about 0.1(5|49|51) mm"));
+  EXPECT_EQ(why_not_scale(3e-3, 0.449e-3, 10), "");
+  EXPECT_NE(why_not_scale(3e-3, 0.451e-3, 10), "");
+  EXPECT_EQ(why_not_scale(3e-3, 0.051e-3, 10), "");
+  EXPECT_NE(why_not_scale(3e-3, 0.0499e-3, 10), "");
+  EXPECT_TRUE(found(0.15e-3).ok());
+}
+
+// Marks on beads: rows of disks 1.5 of their diameters apart.
+TEST(Photographs, DisksThatNowhereTouchAreDoubted) {
+  std::vector<RenderedDisk> marks;
+  for (int row = 0; row < 8; ++row)
+    for (int k = 0; k < 12 - row % 2; ++k) marks.push_back({30.0 + 24 * k + 12 * (row % 2), 210 - 20.8 * row, 8});
+  const GrayFrame frame = render_frame(marks, {.width = 320, .height = 240, .blur_px = 0.8, .read_noise = 3});
+  const BedFound bed = measure_bed(std::vector{view_of(frame)}, {.bead_diameter_m = 3e-3});
+  EXPECT_EQ(bed.status, FindStatus::doubtful) << bed.message;
+  EXPECT_THAT(bed.message, testing::StartsWith("Hardly any of the 92 disks found touch: nearest centres are typically "
+                                               "1.5 diameters"));
+  EXPECT_EQ(bed.measurement.warnings.front(), bed.message);
+  EXPECT_EQ(bed.measurement.disks.size(), 92U) << "they are there to be looked at";
 }
 
 TEST(Photographs, ImagesInMemoryAreMeasuredAsTheirFiles) {
