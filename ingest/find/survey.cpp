@@ -58,6 +58,14 @@ constexpr double largest_proposed = 0.25;
 // px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
 // drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
 constexpr double wide_enough_px = 24;
+// Narrower circles are believed where so many are seen nearly whole, and no harmonic of their outlines exceeds this,
+// radii: of drawn disks of 5 to 10 px up to 0.005, with much noise 0.009; of hexagons of 8.5 px 0.020, and of other
+// shapes 0.022 to 0.09.
+constexpr std::ptrdiff_t fewest_whole = 20;
+constexpr double nearly_whole = 0.9, clearly_round = 0.01;
+// Small hexagons are as round as that, but the sixth harmonic of their outlines stands out: it is 0.0056 radii or more
+// for 5.5 to 7.5 px, and 2.2 to 4.2 times the fifth. Noise makes both alike: at most 1.8 times in drawn disks.
+constexpr double six_corners = 0.004, sixth_stands_out = 2;
 // px, width: twice as wide, so that the shape of an outline shows in the reduced picture that circles are searched in.
 constexpr double outline_tells_px = 2 * wide_enough_px;
 // Few circles must be seen nearly whole: squares and ovals of a drawing are half seen as circles.
@@ -414,16 +422,18 @@ struct ExaminedPicture {
   PictureMaps maps;
 };
 
-// What a picture shows of a hypothesis. `region`: where all outlines are round, if those elsewhere are not.
-SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
+// What a picture shows of a hypothesis, of which something is known before. `region`: where all outlines are round, if
+// those elsewhere are not.
+struct Examined {
+  SurveyCandidate candidate;
+  Roundness roundness;  // not measured where the candidate is refused for another reason
+};
+Examined examined_as(ExaminedPicture& of, const CircleHypothesis& hypothesis, const SurveyAsked& asked, Known known) {
   const GrayFrame& picture = of.picture;
   const bool given = asked.options.radius_px.has_value();
-  const double width = 2 * hypothesis.radius_px;
-  const Known unasked = width >= outline_tells_px ? Known::wide
-                        : width >= wide_enough_px ? Known::fairly_wide
-                                                  : Known::nothing;
-  LearnedRims learned = learn_rims(of.maps, hypothesis.polarity, hypothesis.radius_px, given ? Known::radius : unasked);
-  SurveyCandidate candidate;
+  LearnedRims learned = learn_rims(of.maps, hypothesis.polarity, hypothesis.radius_px, known);
+  Examined out;
+  SurveyCandidate& candidate = out.candidate;
   candidate.rims = std::move(learned.model);
   candidate.disks = std::move(learned.disks);
   judge(candidate, learned.edge_length_px, given);
@@ -432,14 +442,43 @@ SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis
   if (const char* why = why_drawn(asked.signs, candidate.explained_share)) candidate.why_drawn = why;
   if (candidate.why_not.empty() && !asked.options.any_shape) candidate.why_not = candidate.why_drawn;
   if (candidate.why_not.empty()) {
-    const Roundness roundness = roundness_of(of.maps, candidate.rims, candidate.disks);
-    judge_shape(candidate, roundness, asked.options.any_shape);
+    out.roundness = roundness_of(of.maps, candidate.rims, candidate.disks);
+    judge_shape(candidate, out.roundness, asked.options.any_shape);
     const bool outlines_tell = candidate.rims.radius_px > coarse_px && !asked.options.any_shape && !asked.options.roi;
-    if (roundness.round_side && outlines_tell)
-      candidate.region = part_on(*roundness.round_side, picture.width, picture.height);
+    if (out.roundness.round_side && outlines_tell)
+      candidate.region = part_on(*out.roundness.round_side, picture.width, picture.height);
   }
   candidate.plausible = candidate.plausible && candidate.why_not != spots;
-  return candidate;
+  return out;
+}
+
+bool is_clearly_round(const Roundness& roundness) {
+  const auto& harmonic = roundness.harmonic;
+  return roundness.outlines > 0 && *std::max_element(harmonic.begin() + 3, harmonic.end()) <= clearly_round &&
+         harmonic[6] <= std::max(six_corners, sixth_stands_out * harmonic[5]);
+}
+
+// Whether the circles of a hypothesis are many that are seen whole, and clearly rounder than small hexagons. Stretched
+// copies of such disks pass as parts of circles, and say nothing against them.
+std::optional<SurveyCandidate> examined_as_closed(ExaminedPicture& of, const CircleHypothesis& hypothesis,
+                                                  const SurveyAsked& asked) {
+  const auto whole = std::count_if(hypothesis.seen.begin(), hypothesis.seen.end(),
+                                   [](const Circle& circle) { return circle.support >= nearly_whole; });
+  if (whole < fewest_whole) return std::nullopt;
+  Examined out = examined_as(of, hypothesis, asked, Known::fairly_wide);
+  if (!out.candidate.why_not.empty() || !is_clearly_round(out.roundness)) return std::nullopt;
+  return std::move(out.candidate);
+}
+
+SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis, const SurveyAsked& asked) {
+  const bool given = asked.options.radius_px.has_value();
+  const double width = 2 * hypothesis.radius_px;
+  const Known unasked = width >= outline_tells_px ? Known::wide
+                        : width >= wide_enough_px ? Known::fairly_wide
+                                                  : Known::nothing;
+  SurveyCandidate candidate = examined_as(of, hypothesis, asked, given ? Known::radius : unasked).candidate;
+  if (given || unasked != Known::nothing || candidate.why_not.empty() || candidate.not_round) return candidate;
+  return examined_as_closed(of, hypothesis, asked).value_or(std::move(candidate));
 }
 
 // Of a picture in which the circles are small, the part in which most of them were seen. None where the part would be

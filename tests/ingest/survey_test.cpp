@@ -298,6 +298,41 @@ TEST(Survey, RingsInBeadsAreNoFurtherCandidates) {
 }
 
 // Beads of 10 and of 20 px. The radius that is given decides which are meant; one that no bead has finds none.
+// With corners on a circle of this radius.
+bool in_polygon(const Place& place, int corners, double radius, double x, double y) {
+  const double right = x - place.x, down = y - place.y, part = 2 * std::numbers::pi / corners;
+  const double angle = std::atan2(down, right), from_middle = angle - part * (std::floor(angle / part) + 0.5);
+  return std::hypot(right, down) * std::cos(from_middle) < radius * std::cos(part / 2);
+}
+
+// Small disks in a clean picture are seen whole, all of them: poorer circles, of which its stretched copies are full,
+// say nothing against them. Small hexagons are not so round.
+TEST(Survey, SmallDisksInACleanPictureAreFound) {
+  const auto lattice = [](double radius) {
+    std::vector<Place> places;
+    for (int row = 0; row < 9; ++row)
+      for (int k = 0; k < 9; ++k) places.push_back({(3 + 4 * k + 2 * (row % 2)) * radius, (3 + 3.5 * row) * radius});
+    return places;
+  };
+  const auto seen = [](double radius, const Paint& paint) {
+    const int side = static_cast<int>(40 * radius);
+    return survey_of({{Channel::grey, painted(side, side, paint)}});
+  };
+  for (const double radius : {5.5, 8.0}) {
+    const std::vector<Place> places = lattice(radius);
+    const BeadAt disk_at(places, radius);
+    const Paint disks = [&](double x, double y) { return disk_at(x, y) == nullptr ? 200.0 : 60.0; };
+    expect_all(seen(radius, disks), places, radius);
+  }
+  const std::vector<Place> places = lattice(8);
+  const BeadAt around(places, 8.8);
+  const Paint hexagons = [&](double x, double y) {
+    const Place* one = around(x, y);
+    return one != nullptr && in_polygon(*one, 6, 8.8, x, y) ? 60.0 : 200.0;
+  };
+  EXPECT_FALSE(seen(8, hexagons).found);
+}
+
 // Things as wide as disks of this radius, with corners.
 bool in_square(const Place& place, double half, double x, double y) {
   return std::abs(x - place.x) < half && std::abs(y - place.y) < half;
@@ -315,13 +350,6 @@ TEST(Survey, SmallSquaresAreRefusedWithWhatWouldHelpIfTheyWereBeads) {
               testing::AllOf(testing::HasSubstr("they have 4 corners"),
                              testing::HasSubstr("blur alone can cause this for beads that touch: if these are beads, "
                                                 "photograph them at least 24 px wide")));
-}
-
-// With corners on a circle of this radius.
-bool in_polygon(const Place& place, int corners, double radius, double x, double y) {
-  const double right = x - place.x, down = y - place.y, part = 2 * std::numbers::pi / corners;
-  const double angle = std::atan2(down, right), from_middle = angle - part * (std::floor(angle / part) + 0.5);
-  return std::hypot(right, down) * std::cos(from_middle) < radius * std::cos(part / 2);
 }
 
 // Disks to the left, pentagons of about their size to the right.
