@@ -118,8 +118,6 @@ class Map : public Stage {
     take_fit(context, question);
     const Beads beads = take_bed(context, question);
     take_options(question);
-    if (!(question.gamma > 0) || !(question.frequency > 0))
-      throw InputError("the floor of this bed does not shake, so there is no Gamma. Give \"gamma\" and \"frequency\"");
     if (const auto odd = gamma_ ? odd_gamma(*gamma_) : std::nullopt)
       context.warning(
           fmt::format("Gamma = {:.3g}. {}. Check the amplitude, which is half the way between the floor's lowest and "
@@ -165,8 +163,6 @@ class Map : public Stage {
     const BedDescription bed = BedDescription::read(source->file("bed.json"));
     if (!beads.restitution) beads.restitution = bed.restitution;
     if (!beads.friction) beads.friction = bed.friction;
-    if (bed.reduced && !(diameter_ && frequency_))
-      throw InputError("the bed is in reduced units, so the map needs \"diameter\" and \"frequency\" in this stage");
     question.gamma = bed.gamma();
     question.frequency = bed.frequency.value_or(0), question.diameter = bed.diameter;
     if (!bed.reduced && bed.gravity) question.gravity = *bed.gravity;
@@ -259,6 +255,15 @@ class Map : public Stage {
       if (shakes) require_same_as_bed(fields, "gamma", gamma_, bed.gamma(), dimension::none);
     }
     const bool simulated = known != nullptr && known->bed.mass.has_value();
+    if (simulated) {
+      fields.require((gamma_ || known->bed.gamma() > 0) && (frequency_ || known->bed.frequency.value_or(0) > 0),
+                     "gamma", "the floor of this bed does not shake, so there is no Gamma",
+                     "Give \"gamma\" and \"frequency\"");
+      fields.require(!known->bed.reduced || frequency_, "frequency",
+                     "the bed is in reduced units, so its frequency is not known in Hz", "Give \"frequency\"");
+      fields.require(!known->bed.reduced || diameter_, "diameter",
+                     "the bed is in reduced units, so its diameter is not known in m", "Give \"diameter\"");
+    }
     const auto need = [&](const char* key, bool there) {
       fields.require(there, key,
                      fmt::format("\"{}\" is missing, and no stage in \"from\" states it; give it here", key));

@@ -357,6 +357,65 @@ TEST_F(StageMistakes, OfMapsAndPictures) {
                         "\"frames\": {\"count\": 640} to "));
 }
 
+// A simulated bed has no Gamma where its floor stands still, and no sizes in reduced units: both are known before it
+// runs.
+TEST_F(StageMistakes, OfMapsOfSimulatedBeds) {
+  const auto map = [&](const std::string& scene, const std::string& keys) {
+    return said_of(bed(scene) + R"(, { "stage": "map", "from": "bed")" + keys + " }");
+  };
+  const std::string sizes = R"(, "frequency": "20 Hz", "diameter": "3 mm")";
+  EXPECT_EQ(map(shaken, sizes), "");
+  EXPECT_EQ(
+      map(shaken, R"(, "diameter": "3 mm")"),
+      "/stages/1/frequency: the bed is in reduced units, so its frequency is not known in Hz. Give \"frequency\"");
+  EXPECT_EQ(map(shaken, R"(, "frequency": "20 Hz")"),
+            "/stages/1/diameter: the bed is in reduced units, so its diameter is not known in m. Give \"diameter\"");
+  const std::string still =
+      "/stages/1/gamma: the floor of this bed does not shake, so there is no Gamma. Give \"gamma\" and \"frequency\"";
+  EXPECT_EQ(map(warmed, sizes), still);
+  EXPECT_EQ(map(warmed, sizes + R"(, "gamma": 4)"), "");
+  const auto in_si = [&](const std::string& keys) {
+    return said_of(R"({ "stage": "simulate", "id": "bed", "disks": { "count": 40, "diameter": "3 mm" },
+        "box": { "width": "30.9 mm" }, "settle": "1 s", "measure": "1 s" }, { "stage": "map", "from": "bed" )" +
+                   keys + " }");
+  };
+  EXPECT_EQ(in_si(R"(, "gamma": 4)"), still) << "nor a frequency";
+  EXPECT_EQ(in_si(R"(, "frequency": "20 Hz")"), still);
+  EXPECT_EQ(in_si(R"(, "gamma": 4, "frequency": "20 Hz")"), "");
+}
+
+TEST_F(StageMistakes, OfMoreStagesThanAreRead) {
+  const std::string both = bed(shaken + R"(, "frames": { "count": 4 })", "a") + ", " +
+                           bed(shaken + R"(, "frames": { "count": 4 })", "b") + ", ";
+  EXPECT_EQ(said_of(both + R"({ "stage": "render", "from": ["a", "b"] })"),
+            "/stages/2/from: \"from\" names 2 stages, but render reads at most 1");
+}
+
+TEST_F(StageMistakes, OfBeadsThatAreNone) {
+  const auto extract = [&](const char* diameter) {
+    return said_of(R"({ "stage": "extract", "images": "p.csv", "diameter": ")" + std::string(diameter) + "\" }");
+  };
+  EXPECT_EQ(extract("3 mm"), "");
+  EXPECT_THAT(extract("1 m"),
+              StartsWith("/stages/0/diameter: the bead has a diameter of 1 m, but beads of experiments are 50 um to a "
+                         "few cm. Did you mean \"1 mm\"?"));
+}
+
+TEST_F(StageMistakes, OfTheMapsOfAChart) {
+  const auto chart = [&](const std::string& keys) {
+    return said_of(
+        R"({ "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10 },
+           { "stage": "chart", "from": "map", "maps": [ { "name": "m", "x": "jump", "y": "rise", "x_label": "X",
+             "value": "reduced_temperature", "y_label": "Y", "value_label": "V", )" +
+        keys + " } ] }");
+  };
+  EXPECT_EQ(chart(R"("file": "map.csv", "where": { "name": "a" })"), "");
+  EXPECT_EQ(chart(R"("file": "mapp.csv")"),
+            "/stages/1/maps/0/file: \"map\" (map) writes no table \"mapp.csv\". Did you mean \"map.csv\"?");
+  EXPECT_EQ(chart(R"("file": "map.csv", "where": ["name"])"),
+            "/stages/1/maps/0/where: expected an object: column → text");
+}
+
 TEST_F(StageMistakes, OfWhatAStudyMayRun) {
   const auto study = [&](const std::string& stages) {
     return said_of(
