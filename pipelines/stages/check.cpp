@@ -20,13 +20,19 @@ struct Expectation {
   std::string note;
 };
 
-bool has_unit(const Json& json) {
-  if (!json.is_string()) return false;
+// Nothing where it is no text, or one of something else.
+std::optional<Quantity> quantity_in(const Json& json) {
+  if (!json.is_string()) return std::nullopt;
   try {
-    return parse_quantity(json.get<std::string>()).has_unit;
+    return parse_quantity(json.get<std::string>());
   } catch (const std::invalid_argument&) {
-    return false;
+    return std::nullopt;
   }
+}
+
+bool has_unit(const Json& json) {
+  const auto quantity = quantity_in(json);
+  return quantity && quantity->has_unit;
 }
 
 void describe_expectation(Fields& fields, Expectation& e) {
@@ -60,7 +66,7 @@ void describe_expectation(Fields& fields, Expectation& e) {
                  "expected a number, a quantity, a string, true or false");
   const bool tolerance = e.relative || !e.absolute.is_null() || e.std_errors;
   const bool is_quantity = e.value.is_number() || has_unit(e.value);
-  const bool plain = !e.absolute.is_null() && !has_unit(e.absolute);
+  const bool plain = e.absolute.is_number() || (quantity_in(e.absolute) && !has_unit(e.absolute));
   fields.require(!plain || !has_unit(e.value), "absolute", "the expected value has a unit, and this tolerance has none",
                  "Write it with its unit, as the value: \"0.1 mm\"");
   fields.require(!tolerance || is_quantity, "value", "a tolerance is given, but the expected value is not a number");
@@ -257,7 +263,7 @@ class Check : public Stage {
   }
 
  private:
-  // An expectation in a unit that the result cannot have.
+  // An expectation in a unit that the result cannot have. That a tolerance or bound is no quantity has been said.
   static void check_unit(Fields& fields, const std::string& where, const Expectation& expectation,
                          const StatedResult& stated) {
     if (stated.kind != ResultKind::quantity && stated.kind != ResultKind::number) return;
@@ -266,7 +272,7 @@ class Check : public Stage {
                                                        {"least", &expectation.least},
                                                        {"most", &expectation.most}};
     for (const auto& [key, json] : all) {
-      if (!json->is_string()) continue;
+      if (!json->is_string() || (json != &expectation.value && !quantity_in(*json))) continue;
       try {
         in_unit_of(*json, {.json = json, .unit = stated.unit}, "the expected value");
       } catch (const std::invalid_argument& problem) {

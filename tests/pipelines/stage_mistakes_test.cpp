@@ -322,6 +322,18 @@ TEST_F(StageMistakes, OfExpectations) {
             "\"std_errors\"");
   EXPECT_EQ(expect(R"("value": true, "relative": 0.1)"),
             "/stages/1/expect/~1map~1diameter/value: a tolerance is given, but the expected value is not a number");
+  const std::string at = "/stages/1/expect/~1map~1diameter";
+  EXPECT_EQ(expect(R"("value": "3 mm", "absolute": "0.1 mmm")"),
+            at + "/absolute: \"0.1 mmm\": there is no unit \"mmm\"; did you mean \"mm\"?")
+      << "once";
+  EXPECT_EQ(expect(R"("value": "3 mm", "absolute": "0.1")"),
+            at +
+                "/absolute: the expected value has a unit, and this tolerance has none. Write it with its unit, as the "
+                "value: \"0.1 mm\"");
+  EXPECT_EQ(expect(R"("least": "x")"), at + "/least: \"x\" does not begin with a number");
+  EXPECT_EQ(expect(R"("most": "5 furlong")"), at + "/most: \"5 furlong\": there is no unit \"furlong\"");
+  EXPECT_EQ(expect(R"("most": "5 s")"), at + "/most: the result is in \"m\", but the expected value is a time");
+  EXPECT_EQ(expect(R"("value": "high")"), at + "/value: \"high\" does not begin with a number");
   EXPECT_THAT(expect(R"("relative": 0.1)"), HasSubstr("this expectation is empty: it has neither \"value\" nor"));
 }
 
