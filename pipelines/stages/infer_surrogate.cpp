@@ -63,7 +63,7 @@ fit::Surrogate trained(const InferOptions& options, const PlacedBeds& placed, co
 }  // namespace
 
 double to_scale(std::size_t number, double value) {
-  if (is_density(number)) return std::sqrt(std::max(0.0, value) + least_density);
+  if (is_density(number)) return std::sqrt(std::max(value, 0.0) + least_density);  // NaN stays NaN: a bed without one
   if (!observables()[number].logarithmic) return value;
   return value > 0 ? std::log(value) : NAN;
 }

@@ -397,6 +397,28 @@ TEST_F(BedsOfAFormula, WithoutTheirNumberAreLeftOut) {
   EXPECT_EQ(known_parameters(stage_, options_, beds_, {target}).all->beds(rise_), 50U);
 }
 
+// Too few beds with the number are no surrogate, which is said of the number, or of the profile.
+TEST_F(BedsOfAFormula, AreTooFewWhereMostLackTheirNumber) {
+  options_.bed.heights = {0.5};
+  for (RunBed& bed : beds_) bed.numbers.push_back(NAN);
+  for (std::size_t i = 2; i < 60; ++i) beds_[i].numbers[rise_] = NAN;
+  const auto said = [&](std::size_t number) -> std::string {
+    try {
+      const BedSurrogate all{options_, beds_, {{number, 5, 0.3, 0, 0.3}}, BedSurrogate::Training{{{0}, {1}}, false, 1}};
+    } catch (const StageError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(said(rise_),
+            "center_of_mass_rise: a surrogate of 1 parameters needs at least 12 runs, but 2 were given (beds whose fit "
+            "failed are not counted)");
+  EXPECT_EQ(said(observables().size()),
+            "profile: a surrogate of 1 parameters needs at least 12 runs, but 0 were given (beds whose fit failed are "
+            "not counted)")
+      << "a bed that was given up has no density, not a density of 0";
+}
+
 // The same beds photographed at two moments: there the rise is 2 more and 2 less than on average. The density at two
 // heights goes with x, too. The prior of the average is 0.4, of each moment 0.3.
 class ViewsOfAFormula : public BedsOfAFormula {
