@@ -153,7 +153,7 @@ std::string bash_completion(const CLI::App& app, const std::vector<Command>& com
   std::string out =
       "# bash completion for shakebed\n_shakebed() {\n"
       "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]}\n"
-      "  local command=${COMP_WORDS[1]} words=\n"
+      "  local command=${COMP_WORDS[1]} words= below=\n"
       "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n";
   out += fmt::format("    COMPREPLY=($(compgen -W \"{} {}\" -- \"$word\"))\n    return\n  fi\n",
                      joined(direct_subcommands(app), " "), joined(option_words(app), " "));
@@ -168,16 +168,16 @@ std::string bash_completion(const CLI::App& app, const std::vector<Command>& com
   for (const Command& command : commands) {
     if (command.name.find(' ') != std::string::npos) continue;
     std::vector<std::string> words = option_words(*command.app);
-    for (const CLI::App* sub : command.app->get_subcommands([](const CLI::App*) { return true; })) {
-      words.push_back(sub->get_name());
+    for (const CLI::App* sub : command.app->get_subcommands([](const CLI::App*) { return true; }))
       for (const std::string& word : option_words(*sub)) words.push_back(word);
-    }
-    out += fmt::format("    {}) words=\"{}\" ;;\n", command.name, joined(words, " "));
+    const std::string below = joined(direct_subcommands(*command.app), " ");
+    out += fmt::format("    {}) words=\"{}\"{} ;;\n", command.name, joined(words, " "),
+                       below.empty() ? "" : " below=\"" + below + "\"");
   }
   return out +
          "  esac\n"
          "  case \"$word\" in\n    -*) COMPREPLY=($(compgen -W \"$words\" -- \"$word\")) ;;\n"
-         "    *) COMPREPLY=($(compgen -f -- \"$word\")) ;;\n  esac\n}\n"
+         "    *) COMPREPLY=($(compgen -W \"$below\" -- \"$word\") $(compgen -f -- \"$word\")) ;;\n  esac\n}\n"
          "complete -o filenames -F _shakebed shakebed\n";
 }
 

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "pipelines/formats/json.hpp"
+#include "pipelines/formats/process.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/pipelines/read_table.hpp"
 
@@ -189,6 +192,212 @@ TEST_F(ImageCommands, OfAnInferenceNameTheirOptions) {
   EXPECT_THAT(infer({"--beds", "19"}), HasSubstr("--beds"));
 }
 
+// Nothing can be read: the first pilot of the budget, every fourth of 17 pictures, says so.
+TEST_F(ImageCommands, SayWhyTheirPilotFailed) {
+  std::vector<std::string> arguments{"fit-images", "--diameter", "3 mm", "--budget", "5 %", "--out", "o"};
+  for (int k = 0; k < 17; ++k) {
+    arguments.push_back("p" + std::to_string(10 + k) + ".png");
+    write_text(folder_ / arguments.back(), "no picture");
+  }
+  EXPECT_THAT(refused(arguments, 5), testing::StartsWith("the pilot run of --budget, with 5 of 17 frames, failed: "
+                                                         "extract (extract): (frames): no frame could be read (" +
+                                                         (folder_ / "p10.png").string() + ": "));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "o/extract"));
+}
+
+TEST_F(ImageCommands, APreviewReadsEveryLength) {
+  EXPECT_THAT(refused(with({"--preview", "--second-diameter", "2 s"})),
+              HasSubstr("--second-diameter: \"2 s\" is a time, but a length is needed"));
+}
+
+// --- shipped recipes, points of your own, clusters
+
+TEST_F(OptionCommands, ReproduceNamesItsRecipes) {
+  EXPECT_EQ(refused({"reproduce", "lee-1996"}), "there is no recipe \"lee-1996\"; did you mean \"lee-1995\"?");
+  EXPECT_EQ(refused({"reproduce", "al"}), "there is no recipe \"al\"; did you mean \"all\"?");
+  EXPECT_EQ(refused({"reproduce", "zzzzzzzzzzz"}),
+            "there is no recipe \"zzzzzzzzzzz\"; `shakebed reproduce --list` shows the names");
+}
+
+// A stage that no recipe has: each recipe is refused, one does not keep the others from being tried.
+TEST_F(OptionCommands, ReproduceTriesAllRecipes) {
+  const ProgramResult ran = run({"reproduce", "all", "--preset", "quick", "--only", "nobody", "--out", "o"});
+  EXPECT_EQ(ran.exit_code, 2) << "the code of the first";
+  const Json listed = Json::parse(run({"reproduce", "--list", "--json"}).out);
+  ASSERT_GE(listed.size(), 12U);
+  std::size_t at = 0, of_table = ran.out.find("== all figures\n");
+  ASSERT_NE(of_table, std::string::npos);
+  for (const Json& recipe : listed) {
+    const auto name = recipe["name"].get<std::string>();
+    at = ran.out.find("== " + name + "\n", at);
+    ASSERT_LT(at, of_table) << name;
+    EXPECT_THAT(ran.err, HasSubstr("error: " + name + ": there is no stage \"nobody\"")) << name;
+    const std::size_t row = ran.out.find("\n" + name + " ", of_table);
+    ASSERT_NE(row, std::string::npos) << name;
+    const std::string line = ran.out.substr(row + 1, ran.out.find('\n', row + 1) - row - 1);
+    EXPECT_THAT(line, HasSubstr(" exit code 2 ")) << name;
+    EXPECT_THAT(line, testing::EndsWith("  o/" + name + "/report.html")) << name;
+  }
+}
+
+TEST_F(OptionCommands, PointsNeedAStageThatDrawsThem) {
+  write_text(folder_ / "mine.csv", "height,number_density\n0,1\n1,0.5\n");
+  write_text(folder_ / "r.json", small_recipe());
+  EXPECT_EQ(refused({"run", "r.json", "--data", "mine.csv"}),
+            "--data: no stage of this recipe draws the points. Leave --data out, or add a figure stage to the recipe");
+  EXPECT_THAT(refused({"run", "r.json", "--data", "none.csv"}, 4), HasSubstr("--data none.csv: there is no such file"));
+}
+
+// Three points in two tasks: the scripts are written, and what would be submitted is shown.
+TEST_F(OptionCommands, SubmitShowsItsJobs) {
+  write_text(folder_ / "r.json", small_recipe(R"({ "over": { "/stages/bed/seed": [1, 2, 3] } })"));
+  const ProgramResult ran = run({"submit", "slurm", "r.json", "--shards", "2", "--sbatch=--time=1:00:00", "--set",
+                                 "/stages/bed/measure=0.4 s", "--out", "o", "--dry-run"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const std::string folder = std::filesystem::canonical(folder_ / "o/slurm").string();
+  EXPECT_EQ(ran.out, "sbatch --parsable --array=1-2 --output=" + folder + "/%x-%A-%a.log --time=1:00:00 " + folder +
+                         "/array.sh\nsbatch --parsable --output=" + folder +
+                         "/%x-%j-gather.log --time=1:00:00 --dependency=afterany:JOB " + folder + "/gather.sh\n");
+  EXPECT_THAT(read_text(folder_ / "o/slurm/array.sh"), HasSubstr(" --set '/stages/bed/measure=0.4 s' "));
+  EXPECT_THAT(read_text(folder_ / "o/slurm/array.sh"), HasSubstr("--shard \"$SLURM_ARRAY_TASK_ID/2\"\n"));
+  write_text(folder_ / "r.json", small_recipe());
+  EXPECT_THAT(refused({"submit", "slurm", "r.json", "--dry-run"}), HasSubstr("this recipe has no \"sweep\""));
+}
+
+// --- what is installed beside the program
+
+// A program of its own, in bin/, with what an installation holds made by hand.
+class InstalledProgram : public OptionCommands {
+ protected:
+  InstalledProgram() {
+    for (const char* part : {"bin", "share/shakebed", "libexec/shakebed", "work"})
+      std::filesystem::create_directories(folder_ / part);
+    std::filesystem::copy_file(program_file(), folder_ / "bin/shakebed");
+  }
+  pipelines::ProcessResult installed(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), (folder_ / "bin/shakebed").string());
+    return pipelines::run_process(arguments, folder_ / "work");
+  }
+};
+
+TEST_F(InstalledProgram, WritesItsLivePage) {
+  const std::string page = "<!doctype html>\n<!-- shakebed live: test -->\n<p>one</p>\n";
+  write_text(folder_ / "share/shakebed/live-bed.html", page);
+  EXPECT_EQ(installed({"live"}).output, "wrote bed.html: open it in a browser\n");
+  EXPECT_EQ(read_text(folder_ / "work/bed.html"), page);
+  // Its own page is replaced, and no other file.
+  write_text(folder_ / "share/shakebed/live-bed.html", page + "two");
+  std::filesystem::create_directory(folder_ / "work/d");
+  EXPECT_EQ(installed({"live", "--out", "bed.html"}).exit_code, 0);
+  EXPECT_EQ(read_text(folder_ / "work/bed.html"), page + "two");
+  EXPECT_EQ(Json::parse(installed({"live", "--out", "d", "--json"}).output)["file"], "d/bed.html");
+  EXPECT_EQ(read_text(folder_ / "work/d/bed.html"), page + "two");
+  write_text(folder_ / "work/thesis.html", "<!doctype html><p>mine</p>" + std::string(200, ' ') + page);
+  const pipelines::ProcessResult refused = installed({"live", "--out", "thesis.html"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.output,
+            "error: thesis.html exists and was not written by shakebed live; name another file with --out\n");
+  EXPECT_THAT(read_text(folder_ / "work/thesis.html"), testing::StartsWith("<!doctype html><p>mine"));
+}
+
+// The program of the benchmarks takes the place of this one, with all that follows "bench".
+TEST_F(InstalledProgram, BecomesItsBenchmarks) {
+  const std::filesystem::path bench = folder_ / "libexec/shakebed/shakebed-bench";
+  write_text(bench, "#!/bin/sh\nprintf '%s,' \"$@\"\nexit 7\n");
+  std::filesystem::permissions(bench, std::filesystem::perms::owner_all);
+  const pipelines::ProcessResult ran = installed({"bench", "--quick", "a b", "--help"});
+  EXPECT_EQ(ran.exit_code, 7);
+  EXPECT_EQ(ran.output, "--quick,a b,--help,");
+  std::filesystem::permissions(bench, std::filesystem::perms::owner_read);
+  EXPECT_THAT(
+      installed({"bench"}).output,
+      testing::MatchesRegex("error: .*/libexec/shakebed/shakebed-bench: cannot be started: Permission denied\n"));
+}
+
+// Manual pages and completions, written at installation.
+class CommandPages : public OptionCommands {
+ protected:
+  CommandPages() { EXPECT_EQ(run({"--write-command-pages", "p"}).exit_code, 0); }
+  std::string page(const std::string& name) { return read_text(folder_ / ("p/man/man1/" + name + ".1")); }
+  // What bash offers behind these words, in their order.
+  std::vector<std::string> offered(const std::vector<std::string>& words) {
+    std::vector<std::string> arguments{
+        "bash", "-c",
+        ". p/bash-completion/completions/shakebed\nCOMP_WORDS=(\"$@\") COMP_CWORD=$(($# - 1))\n_shakebed\n"
+        "printf '%s\\n' \"${COMPREPLY[@]}\"",
+        "bash", "shakebed"};
+    arguments.insert(arguments.end(), words.begin(), words.end());
+    std::istringstream lines(pipelines::run_process(arguments, folder_.path()).output);
+    std::vector<std::string> all;
+    for (std::string line; std::getline(lines, line);)
+      if (!line.empty()) all.push_back(line);
+    return all;
+  }
+};
+
+TEST_F(CommandPages, AreOneForEachCommand) {
+  const std::string all = page("shakebed");
+  std::size_t pages = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "p/man/man1")) {
+    std::string name = entry.path().stem().string();
+    ++pages;
+    if (name == "shakebed") continue;
+    for (std::size_t i = 0; (i = name.find('-', i)) != std::string::npos; i += 2) name.replace(i, 1, "\\-");
+    EXPECT_THAT(all, HasSubstr("\n.BR " + name + " (1)\n")) << name;
+  }
+  std::size_t named = 0;
+  for (std::size_t at = 0; (at = all.find("\n.BR shakebed\\-", at)) != std::string::npos; ++at) ++named;
+  EXPECT_EQ(named, pages - 1);
+  EXPECT_THAT(all, HasSubstr("\n.BR shakebed\\-submit\\-slurm (1)\n"));
+  EXPECT_THAT(all, testing::StartsWith(".TH shakebed 1 \"\" \"shakebed "));
+  EXPECT_THAT(all, HasSubstr("\n.SH EXIT STATUS\n"));
+}
+
+TEST_F(CommandPages, HoldTheOptionsAndExamplesOfACommand) {
+  const std::string theory = page("shakebed-theory");
+  EXPECT_THAT(theory, testing::StartsWith(".TH shakebed-theory 1 \"\" \"shakebed "));
+  EXPECT_THAT(theory, HasSubstr("\n.SH NAME\nshakebed\\-theory \\- compute the constants of the theory, T_c and the "
+                                "solid height\n.SH SYNOPSIS\n.B shakebed theory\n[\\fIoptions\\fR]\n.SH OPTIONS\n"));
+  EXPECT_THAT(theory, HasSubstr("\n.TP\n\\fB\\-q, \\-\\-quiet\\fR\nshow the result"));
+  EXPECT_THAT(theory, HasSubstr("\n.TP\n\\fB\\-\\-plateau\\-density\\fR \\fIFLOAT\\fR\ndensity phi_0 of the solid"));
+  EXPECT_THAT(theory, HasSubstr("\n.SH EXAMPLES\n.nf\n  shakebed theory \\-\\-plateau\\-density 1.10\n"));
+  EXPECT_THAT(theory, testing::EndsWith("\n.TP\n130\ninterrupted\n.SH SEE ALSO\n.BR shakebed (1)\n"));
+  // What has no dashes belongs to the synopsis; words to choose from are an argument.
+  EXPECT_THAT(page("shakebed-status"), HasSubstr("\n.B shakebed status\n.I folder\n[\\fIoptions\\fR]\n"));
+  EXPECT_THAT(page("shakebed-status"), HasSubstr("\n.TP\n\\fBfolder\\fR \\fIDIR\\fR\nresults folder"));
+  EXPECT_THAT(page("shakebed-graph"), HasSubstr("\\-\\-format\\fR \\fI{dot,mermaid}\\fR\n"));
+  EXPECT_THAT(page("shakebed-submit-slurm"), HasSubstr("\n.B shakebed submit slurm\n.I recipe\n"));
+}
+
+TEST_F(CommandPages, CompleteInBash) {
+  using testing::Contains;
+  using testing::ElementsAre;
+  write_text(folder_ / "slope.csv", "");
+  EXPECT_THAT(offered({"rep"}), ElementsAre("reproduce"));
+  EXPECT_THAT(offered({"--vers"}), ElementsAre("--version"));
+  EXPECT_THAT(offered({"theory", "--col"}), ElementsAre("--column-number"));
+  EXPECT_THAT(offered({"fit-images", "--polarity", ""}), ElementsAre("automatic", "dark", "bright"));
+  EXPECT_THAT(offered({"fit-images", "--polarity", "b"}), ElementsAre("bright"));
+  EXPECT_THAT(offered({"fit-profile", "slo"}), ElementsAre("slope.csv"));
+  EXPECT_THAT(offered({"submit", "sl"}), ElementsAre("slurm", "slope.csv"));
+  EXPECT_THAT(offered({"submit", "slurm", "--sha"}), ElementsAre("--shards"));
+  EXPECT_THAT(offered({"run", "--shards"}), testing::IsEmpty());
+}
+
+TEST_F(CommandPages, CompleteInZsh) {
+  const std::string text = read_text(folder_ / "p/zsh/site-functions/_shakebed");
+  EXPECT_THAT(text, testing::StartsWith("#compdef shakebed\n_shakebed() {\n"));
+  EXPECT_THAT(text, HasSubstr("\n    'reproduce:run a shipped recipe\\: a published result, end to end'\n"));
+  EXPECT_THAT(text,
+              HasSubstr("\n    theory)\n      _arguments \\\n        '-h[Print this help message and exit]' \\\n"));
+  EXPECT_THAT(text, HasSubstr("\n        '--json[JSON result on stdout, messages on stderr]' \\\n"));
+  EXPECT_THAT(text, HasSubstr("\n        '--polarity["));
+  EXPECT_THAT(text, HasSubstr("]:{automatic,dark,bright}:(automatic dark bright)' \\\n"));
+  EXPECT_THAT(text, HasSubstr("\n        '--initial-height[height mu of the bed at rest\\: in D, or a length with its "
+                              "unit]:TEXT:_files' \\\n"));
+  EXPECT_THAT(text, Not(HasSubstr("\n    submit slurm)")));
+}
+
 // --- theory and map
 
 // 11 a diameter of width over a density of 1.1: 10 D high.
@@ -221,6 +430,7 @@ TEST_F(OptionCommands, TheoryTakesHeightsInDiametersAndLengths) {
   EXPECT_EQ(refused({"theory", "--initial-height", "3", "--temperature", "-1"}),
             "--temperature: must be above 0, got -1");
   EXPECT_EQ(refused({"theory", "--initial-height", "0"}), "--initial-height: must be above 0, got 0");
+  EXPECT_EQ(refused({"theory", "--initial-height", "high"}), "--initial-height: \"high\" does not begin with a number");
 }
 
 TEST_F(OptionCommands, MapTakesGammaOrAnAmplitude) {

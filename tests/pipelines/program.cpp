@@ -40,6 +40,8 @@ int spawn(const std::vector<std::string>& arguments, const fs::path& directory, 
 }
 }  // namespace
 
+fs::path program_file() { return SHAKEBED_PROGRAM; }
+
 int wait_for(int process) {
   int status = 0;
   while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {}

@@ -16,6 +16,8 @@ struct ProgramResult {
 };
 // Runs it in `directory` with these arguments.
 ProgramResult run_shakebed(const std::vector<std::string>& arguments, const std::filesystem::path& directory);
+// Its file.
+std::filesystem::path program_file();
 // Starts it and returns its process id; what it says on standard error goes into a file.
 int start_shakebed(const std::vector<std::string>& arguments, const std::filesystem::path& directory,
                    const std::filesystem::path& err = "/dev/null");
