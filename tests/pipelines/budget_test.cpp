@@ -1,4 +1,5 @@
 // --budget: what is asked, what is chosen from a pilot, and what the program does with it.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipelines/formats/json.hpp"
@@ -590,6 +592,149 @@ TEST(BudgetRun, BeginsItsProgressWithEachPilot) {
     ++lines;
   EXPECT_GE(pilots, 2);
   EXPECT_EQ(calls - lines, pilots) << said;
+}
+
+// A stage whose pilots are those of the test, whatever they are asked for: `pilots` by their refinement.
+class GivenPilots : public Stage, public Scalable {
+ public:
+  GivenPilots(EffortLimits limits, std::vector<Changes> pilots, double trial)
+      : limits_(limits), pilots_(std::move(pilots)), trial_(trial) {}
+  void describe(Fields& /*fields*/) override {}
+  void results(ResultList& /*list*/) const override {}
+  void run(RunContext& /*context*/) const override {}
+  double trial_seconds() const override { return trial_; }
+  const Scalable* scalable() const override { return this; }
+  std::string number() const override { return "T_x"; }
+  std::string systematic_cause() const override { return "the weather"; }
+  std::string systematic_remedy() const override { return "a roof"; }
+  EffortLimits limits() const override { return limits_; }
+  Changes changes(const Effort& effort) const override { return {{"/replicas", effort.beds}}; }
+  Changes pilot_changes(const Effort& effort) const override {
+    return pilots_.at(static_cast<std::size_t>(effort.refinement));
+  }
+  EffortReading read(const Effort& effort, const Json& /*result*/, const Json& /*timings*/) const override {
+    return {.effort = effort};
+  }
+
+ private:
+  EffortLimits limits_;
+  std::vector<Changes> pilots_;
+  double trial_;
+};
+
+struct ChosenByPilots {
+  std::string said;
+  Json record;
+  Json pilot(int number) const {
+    return Json::parse(read_text(folder->path() / "o/.pilot/bed" / std::to_string(number) / "bed/observables.json"));
+  }
+  std::unique_ptr<ScratchFolder> folder = std::make_unique<ScratchFolder>();
+};
+ChosenByPilots chosen_by_pilots(const std::string& scene, const std::string& budget, const EffortLimits& limits,
+                                std::vector<Scalable::Changes> pilots, double trial = 0) {
+  ChosenByPilots out;
+  std::vector<Problem> problems;
+  Plan plan =
+      make_plan(*parse_json(R"({ "name": "p", "stages": [ { "stage": "simulate", "id": "bed", "units": "reduced", )" +
+                                scene + " } ] }",
+                            "p.json", problems),
+                "p.json", out.folder->path());
+  plan.stages[0].stage = std::make_unique<GivenPilots>(limits, std::move(pilots), trial);
+  RunOptions options;
+  options.out = *out.folder / "o", options.jobs = 1;
+  testing::internal::CaptureStderr();
+  try {
+    Console console(Console::Level::normal);
+    out.record = choose_by_budget(plan, parse_budget(budget), options, console).record["stages"][0];
+  } catch (const std::exception& error) {
+    ADD_FAILURE() << error.what();
+  }
+  out.said = testing::internal::GetCapturedStderr();
+  return out;
+}
+// Inelastic disks that touch for long: a few per cent of their temperature come from the contact duration.
+const std::string soft_bed = R"("disks": { "count": 12, "restitution": 0.7, "contact_duration": 0.03 },
+    "box": { "width": 5.3, "sides": "periodic" }, "settle": 2, "measure": 20,
+    "floor": { "motion": "sinusoidal", "frequency": 0.45, "gamma": 5, "restitution": 0.7 })";
+Scalable::Changes pilot_with(double contact_duration, double length = 20) {
+  return {{"/replicas", 8}, {"/measure", length}, {"/disks/contact_duration", contact_duration}};
+}
+
+// Where no finer model is left, the warning names cause, size and remedy of the error.
+TEST(BudgetOfPilots, WarnsOfAnErrorThatNoLongerRunReduces) {
+  EffortLimits given{.settling = 2, .shortest = 8, .pilot = 20, .telling = 40, .written = 20};
+  const ChosenByPilots chosen = chosen_by_pilots(soft_bed, "0.1 %", given, {pilot_with(0.03)});
+  const double effect = chosen.pilot(0)["contact_duration_effect"]["value"].get<double>();
+  EXPECT_GT(effect, 0.001);
+  EXPECT_EQ(chosen.record["systematic_error"], effect);
+  EXPECT_FALSE(chosen.record["possible"]);
+  EXPECT_THAT(chosen.said, HasSubstr("warning: bed: the weather alone gives T_x an error of about " +
+                                     fmt::format("{:.2g} %", 100 * effect) +
+                                     ", more than the wanted 0.1 %. A longer measurement does not reduce this error; a "
+                                     "roof does\n"));
+  EXPECT_THAT(chosen.said, Not(HasSubstr("beds differ so much")));
+}
+
+// Three elastic disks without gravity keep the horizontal part of their energy for long, in each bed another one.
+TEST(BudgetOfPilots, WarnsOfBedsThatDifferForEver) {
+  const std::string gas = R"("disks": { "count": 3 }, "gravity": 0, "start_temperature": 1, "settle": 1, "measure": 10,
+      "box": { "width": 30, "sides": "periodic", "lid": { "kind": "periodic", "height": 30 } })";
+  EffortLimits given{.settling = 1, .shortest = 8, .pilot = 20, .telling = 20, .written = 20};
+  const Scalable::Changes pilot{{"/replicas", 8}, {"/measure", 10}};
+  const ChosenByPilots chosen = chosen_by_pilots(gas, "0.01 %", given, {pilot});
+  EXPECT_EQ(chosen.record["beds"], 10000);
+  EXPECT_FALSE(chosen.record["possible"]);
+  EXPECT_THAT(chosen.said, HasSubstr("warning: bed: beds differ so much that even 10000 beds do not reach the wanted "
+                                     "error of 0.01 %. The largest number of beds is used\n"));
+  EXPECT_THAT(chosen.said, Not(HasSubstr("the weather")));
+  EXPECT_THAT(chosen_by_pilots(gas, "50 %", given, {pilot}).said, Not(HasSubstr("warning")));
+}
+
+// A finer model is taken where its error falls by more than its events rise, and where the error needs it; else it is
+// left again. In both cases but the first no finer one is tried. The finer model that gains nothing is the same with
+// three times the events.
+TEST(BudgetOfPilots, TakeAFinerModelWhereItGains) {
+  EffortLimits given{.settling = 2, .shortest = 8, .pilot = 20, .telling = 20, .written = 20};
+  given.most_refinement = 2;
+  const auto chosen = [&](double coarse, double fine, double length) {
+    return chosen_by_pilots(soft_bed, "50 %", given,
+                            {pilot_with(coarse), pilot_with(fine, length), pilot_with(0.0001)});
+  };
+  const auto effect = [](const ChosenByPilots& of, int pilot) {
+    return of.pilot(pilot)["contact_duration_effect"]["value"].get<double>();
+  };
+  const auto pilots = [](const ChosenByPilots& of) {
+    int count = 0;
+    while (std::filesystem::exists(of.folder->path() / "o/.pilot/bed" / std::to_string(count))) ++count;
+    return count;
+  };
+  const ChosenByPilots cheap = chosen(0.3, 0.001, 20);
+  EXPECT_LT(effect(cheap, 1), effect(cheap, 0) / 10);
+  EXPECT_EQ(cheap.record["refinement"], 1);
+  EXPECT_EQ(cheap.record["systematic_error"], effect(cheap, 1));
+  const ChosenByPilots useless = chosen(0.01, 0.01, 60);
+  EXPECT_GT(effect(useless, 0), 0.05) << "a tenth of the error";
+  EXPECT_LT(effect(useless, 0), 0.125) << "a quarter of it";
+  EXPECT_EQ(useless.record["refinement"], 0);
+  EXPECT_EQ(useless.record["systematic_error"], effect(useless, 0));
+  EXPECT_EQ(pilots(useless), 2);
+  const ChosenByPilots dear = chosen(0.3, 0.3, 60);
+  EXPECT_GT(effect(dear, 0), 0.125);
+  EXPECT_EQ(dear.record["refinement"], 1);
+  EXPECT_EQ(dear.record["systematic_error"], effect(dear, 1));
+  EXPECT_EQ(pilots(dear), 2);
+}
+
+// By a trial of 0.06 s for a bed that settles for 1 and is measured for 3, eight beds of 40 that settle for 1 take
+// 8 x 0.015 x 41 = 4.92 s. A quarter of 10 s is left for the pilot: 40 x 2.5/4.92 = 20.3, with three digits upwards.
+TEST(BudgetOfPilots, TakeAQuarterOfTheTime) {
+  EffortLimits given{.settling = 1, .shortest = 8, .pilot = 16, .telling = 40, .written = 3};
+  const auto length = [&](double trial) {
+    return chosen_by_pilots(soft_bed, "10 s", given, {pilot_with(0.03)}, trial).record["pilot"]["length"].get<double>();
+  };
+  EXPECT_DOUBLE_EQ(length(0.06), 20.4);
+  EXPECT_DOUBLE_EQ(length(0.03), 40) << "2.46 s are within it";
+  EXPECT_DOUBLE_EQ(length(10), 4) << "half of the shortest at least";
 }
 
 // What a finished run says of its error: that of four beds has Student's factor 1.6237, and is 0.04 x 1.6237/2; within
