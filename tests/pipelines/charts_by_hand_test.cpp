@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -387,6 +388,30 @@ TEST(FigureByHand, DrawsTheWindowsOfAFit) {
   EXPECT_EQ(label(R"({"model": "m", "answer": {"temperature": {}}, "temperature": {"value": 0.05}})"),
             "our fit, m alone: T = 0.05 mgD");
   EXPECT_EQ(label(R"({"model": "m"})"), "our fit, m alone");
+}
+
+// A row of a table that was cut off, and a trajectory without a frame.
+TEST(FigureByHand, NamesWhatIsDamaged) {
+  LoneStage figure(*find_stage("figure"));
+  figure.add_input("fit", *find_stage("fit"));
+  write_text(figure.file("fit.json"), R"({"model": "m", "temperature": {"value": 0.05}})");
+  write_text(figure.file("windows.csv"), "low,temperature,std_error\n3,0.06,0.002\n");
+  write_text(figure.file("curve.csv"), "height,number_density,smoothed_density\n0,1.1,1.1\n4,0.6\n");
+  const auto said = [](const std::function<void()>& run) -> std::string {
+    try {
+      run();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(said([&] { figure.run("{}"); }),
+            figure.file("curve.csv").string() + ":3: this row has no cell in column \"smoothed_density\"");
+  LoneStage chart(*find_stage("chart"));
+  chart.add_input("my-bed", *find_stage("simulate"));
+  write_text(chart.file("final.extxyz"), "");
+  EXPECT_EQ(said([&] { chart.run(R"({ "snapshots": [ { "name": "s", "from": "my-bed" } ] })"); }),
+            "my-bed/final.extxyz contains no frame; run the simulate stage again");
 }
 
 }  // namespace

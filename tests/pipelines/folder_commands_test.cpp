@@ -113,6 +113,16 @@ TEST_F(FolderCommands, StatusCountsPointsAndJobs) {
   EXPECT_THAT(alone, Not(HasSubstr("no longer in the sweep")));
 }
 
+// Versions before 1.0 left the number of points in the summary alone.
+TEST_F(FolderCommands, StatusCountsThePointsOfAnOldSweep) {
+  fs::create_directories(folder_ / "o/points/000004"), fs::create_directories(folder_ / "o/points/000005");
+  write_text(folder_ / "o/summary.json", R"({ "points": 5 })");
+  EXPECT_EQ(Json::parse(run({"status", "o", "--json"}).out)["sweep"],
+            Json::parse(R"({ "points": 5, "done": 0, "failed": 0, "left_over": 1 })"));
+  write_text(folder_ / "o/points/.sweep", R"({ "points": 6 })");
+  EXPECT_EQ(Json::parse(run({"status", "o", "--json"}).out)["sweep"]["points"], 6);
+}
+
 TEST_F(FolderCommands, StatusOfNoResultsIsAnError) {
   const ProgramResult missing = run({"status", "none"});
   EXPECT_EQ(missing.exit_code, 4);

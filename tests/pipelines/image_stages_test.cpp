@@ -293,6 +293,31 @@ TEST(ExtractedFrames, AreAFilmForThePage) {
   EXPECT_TRUE(std::filesystem::exists(frames.stage.output("residual.webp")));
 }
 
+// A disk of the truth that is in no picture, to tenths of a pixel, and one found that is not in the truth.
+TEST(ExtractedFrames, MarkWhatIsMissedAndWhatIsNone) {
+  RenderedFrames frames(bed_of_camera(), 2);
+  const std::string truth = read_text(frames.stage.file("r/truth.csv"));
+  const std::size_t last = truth.rfind("\n1,24,");
+  ASSERT_NE(last, std::string::npos);
+  write_text(frames.stage.file("r/truth.csv"), truth.substr(0, last) + "\n1,24,75.123,16.46,10\n");
+  const NumberTable written(frames.stage.file("r/truth.csv"));
+  frames.options.overlays = 1;
+  const Json found = frames.extracted();
+  EXPECT_DOUBLE_EQ(found["truth"]["recall"].get<double>(), 49.0 / 50);
+  const Json marks = read_json(frames.stage.output("film.json"))["marks"];
+  EXPECT_TRUE(marks[0]["missed"].empty() && marks[0]["false"].empty());
+  EXPECT_EQ(marks[1]["missed"], Json::parse("[75.1, 16.5]"));
+  ASSERT_EQ(marks[1]["false"].size(), 1U);
+  // The disk that is none lies where the last one was.
+  const NumberTable disks(frames.stage.output("disks.csv"));
+  std::size_t first = 0;
+  while (disks("frame", first) < 1) ++first;
+  const std::size_t wrong = first + marks[1]["false"][0].get<std::size_t>();
+  const TrajectoryFrame frame = rows_of_five(0.02);
+  EXPECT_NEAR(disks("x_px", wrong), 11.5 + 20 * frame.x[24], 0.3);
+  EXPECT_NEAR(disks("y_px", wrong), 130.5 - 20 * frame.z[24], 0.3);
+}
+
 // A photograph of 25 beads of 20 px that touch, on a floor.
 class ExtractedPhotograph {
  public:
@@ -369,6 +394,70 @@ TEST(ExtractedPhotographs, AreThoseThatAreNamed) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::StartsWith("photos: no picture or film was found"));
   }
+}
+
+template <class Photograph>
+std::string refusal_of(Photograph& photograph) {
+  try {
+    photograph.extracted();
+  } catch (const StageError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+// Of a radius of 10 px 3 px are left by squares of 3 px, not by those of 4.
+TEST(ExtractedPhotographs, AreReducedToThreePixelsAtMost) {
+  ExtractedPhotograph photograph;
+  photograph.options.radius = 10, photograph.options.reduction = 4;
+  const std::string folder = photograph.stage.file("").string();
+  EXPECT_THAT(
+      refusal_of(photograph),
+      testing::MatchesRegex(".*a.pgm: averaged over squares of 4 px \\(reduction\\), a bead of (9.[6-9][0-9]*|10|"
+                            "10.[0-4][0-9]*) px radius is left with 2.[45] px; 3 px are needed. Give at most 3"));
+  RenderedFrames frames(bed_of_camera(), 1);
+  frames.options.reduction = 4;
+  EXPECT_EQ(refusal_of(frames), frames.stage.file("r").string() +
+                                    ": averaged over squares of 4 px (reduction), a bead of 10 px radius is left with "
+                                    "2.5 px; 3 px are needed. Give at most 3");
+  frames.options.reduction = 3;
+  EXPECT_EQ(refusal_of(frames), "none");
+}
+
+// The number of beads is known after the measurement only: what was tried then is said, with a page that shows it.
+TEST(ExtractedPhotographs, AreRefusedAfterTheirMeasurementWithAdvice) {
+  ExtractedPhotograph photograph;
+  photograph.options.bead_number = 100;
+  const std::string said = refusal_of(photograph), count = std::to_string(lattice(10, 5, 20, 122, 118, 0.02).size());
+  EXPECT_THAT(said, HasSubstr("bead_number is 100"));
+  EXPECT_THAT(said, HasSubstr("instead of --bead-number give --bead-number " + count + " (tried: " + count +
+                              " dark beads of "));
+  const std::size_t see = said.find(". See "), end = said.find("preview.html. If a picture of preview.html marks");
+  ASSERT_TRUE(see != std::string::npos && end != std::string::npos) << said;
+  const std::string page = read_text(said.substr(see + 6, end - see - 6) + "preview.html");
+  EXPECT_THAT(page, HasSubstr("<h2>1. Tried: " + count + " dark beads of "));
+}
+
+// The first five bad frames are named, the others counted.
+TEST(ExtractedPhotographs, NameTheFirstOfManyBadFrames) {
+  ExtractedPhotograph film;
+  const std::string good = film.stage.file("a.pgm").string();
+  std::vector<std::string> names{good};
+  for (int k = 1; k <= 7; ++k) {
+    names.push_back(film.stage.file("bad" + std::to_string(k) + ".pgm").string());
+    write_text(names.back(), "no picture");
+  }
+  film.options.images.texts = film.options.images.paths = names;
+  EXPECT_EQ(film.extracted()["frames_used"], 1);
+  for (int k = 1; k <= 7; ++k) {
+    const auto named =
+        Contains(testing::StartsWith("frame " + std::to_string(k) + " (bad" + std::to_string(k) + ".pgm): "));
+    if (k <= 5)
+      EXPECT_THAT(film.stage.warnings, named);
+    else
+      EXPECT_THAT(film.stage.warnings, Not(named));
+  }
+  EXPECT_THAT(film.stage.warnings, Contains("2 more frames could not be used; frames.csv lists them"));
 }
 
 // Frames of 4, 0 and 2 disks and 1, 0 and 0 places rejected: a third of 560 px each, 4 being 200 px.

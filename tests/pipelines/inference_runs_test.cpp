@@ -217,9 +217,16 @@ class InferenceFromBeds : public testing::Test {
     recipe_["targets"] = Json{{"center_of_mass_rise", {{"value", 5}, {"std_error", 0.3}}}};
   }
   ~InferenceFromBeds() override { ::setenv("PATH", path_.c_str(), 1); }
-  void infer() {
+  // Why it ends.
+  std::string infer() {
     write_text(stage_.file("b.json"), dump(stored_));
-    EXPECT_THROW(stage_.run(dump(recipe_)), StageError);
+    try {
+      stage_.run(dump(recipe_));
+    } catch (const StageError& error) {
+      return error.what();
+    }
+    ADD_FAILURE() << "it has found gnuplot";
+    return "";
   }
   Json& number(std::size_t bed, std::size_t view, std::size_t k) {
     return stored_["beds"][bed]["numbers"][view * observables().size() + k];
@@ -341,6 +348,32 @@ TEST_F(InferenceFromBeds, DrawsItsViewsByTheirShares) {
   EXPECT_NEAR(views["average"], 800, 50);
   EXPECT_NEAR(views["0"], 100, 40);
   EXPECT_NEAR(views["0.5"], 100, 40);
+}
+
+// Of six beds measured for two periods one has a fit: the number of the others is said. Of five none has one.
+TEST_F(InferenceFromBeds, CountsTheBedsOfItsCalibrationWithoutTargets) {
+  recipe_.update(Json{{"settle", 0}, {"measure", 6}, {"calibration", 6}, {"draws", 200}});
+  stored_["made_from"].update(Json{{"settle", 0}, {"measure", 6}});
+  for (std::size_t k = 0; k < 20; ++k) stored_["beds"].erase(k);  // every second, so that it is quick
+  recipe_["targets"] = Json{{"temperature_over_mg", {{"value", 1.5}, {"std_error", 0.1}}}};
+  infer();
+  const std::size_t complete = NumberTable(stage_.output("calibration.csv")).rows();
+  ASSERT_GT(complete, 0U);
+  EXPECT_THAT(stage_.warnings,
+              Contains(std::to_string(6 - complete) +
+                       " of the 6 beds of the calibration did not give all target numbers and are left out of the "
+                       "calibration"));
+  recipe_["calibration"] = 5;
+  EXPECT_EQ(infer(),
+            "no bed of the calibration gave all target numbers, so the intervals cannot be tested. Measure longer "
+            "(\"measure\"), or set \"calibration\" to 0");
+}
+
+TEST_F(InferenceFromBeds, HasNoPosteriorFarFromItsTargets) {
+  recipe_["targets"]["center_of_mass_rise"] = Json{{"value", 1e160}, {"std_error", 0.1}};
+  EXPECT_EQ(infer(),
+            "all simulated beds are too far from the targets to give a posterior. Check the targets, or give wider "
+            "ranges of the parameters");
 }
 
 // Beds of another measurement are refused.

@@ -357,6 +357,31 @@ TEST(ProposalsForAPicture, LeaveOutTheOptionThatExcludesBeads) {
   EXPECT_EQ(proposals[0].found.disks.size(), bed.places.size());
 }
 
+// Where each option alone excludes the beads, both are left out; the number of beads is none of them.
+TEST(ProposalsForAPicture, LeaveOutAllOptionsThatExcludeBeads) {
+  BedInAPicture bed;
+  bed.options.polarity = BeadPolarity::bright, bed.options.radius = 30;
+  bed.options.bead_number = bed.places.size();
+  const std::vector<Proposal> proposals = proposals_for(bed.look, bed.options, RefusedBy::first_look);
+  ASSERT_EQ(proposals.size(), 1U);
+  EXPECT_THAT(proposals[0].leave_out, ElementsAre("--polarity", "--radius"));
+  EXPECT_EQ(proposals[0].give, "");
+  EXPECT_FALSE(proposals[0].options.radius);
+  EXPECT_EQ(proposals[0].options.bead_number, bed.places.size());
+  EXPECT_EQ(proposals[0].found.disks.size(), bed.places.size());
+}
+
+// A wrong number of beads is replaced by that which is found.
+TEST(ProposalsForAPicture, GiveTheNumberOfBeads) {
+  BedInAPicture bed;
+  bed.options.bead_number = 100;
+  const std::vector<Proposal> proposals = proposals_for(bed.look, bed.options, RefusedBy::measurement);
+  ASSERT_EQ(proposals.size(), 1U);
+  EXPECT_THAT(proposals[0].leave_out, ElementsAre("--bead-number"));
+  EXPECT_EQ(proposals[0].give, "--bead-number " + std::to_string(bed.places.size()));
+  EXPECT_EQ(proposals[0].options.bead_number, bed.places.size());
+}
+
 // A candidate's polarity and radius are given in place of those that are there, and of another shape: no more.
 TEST(ProposalsForAPicture, GiveWhatACandidateNeeds) {
   BedInAPicture bed;
@@ -489,6 +514,29 @@ TEST(DisksOfAPicture, AreATrialOfItsOptions) {
   EXPECT_FALSE(judged(options, found, {}));
   found.disk_total = 80, found.expected_wrong = 0.3;
   EXPECT_FALSE(judged(options, found, {}));
+}
+
+// A reduced copy is tried in the channel that is given: here the beads are in blue alone.
+TEST(ReducedPictures, AreTriedInTheirChannel) {
+  const ScratchFolder folder;
+  const std::string path = (folder / "bed.ppm").string();
+  const std::vector<Place> places = lattice(30, 4, 60, 366, 290, 0.02);
+  const PaintedPicture plain = PaintedPicture(440, 320).noise(2),
+                       beads = PaintedPicture(440, 320).disks(places, 30, 60).blur(1).noise(2, 4);
+  write_text(path, PaintedPicture::ppm(plain, plain, beads));
+  const FirstLook look{path, 440, 320, {}, nullptr};
+  const auto reduced = reduced_for_trials(look, 30);
+  ASSERT_TRUE(reduced);
+  ExtractOptions options;
+  options.diameter = 0.004;
+  const auto tried = [&](BeadChannel channel) {
+    options.channel = channel;
+    return try_options({path, 0}, options, &*reduced);
+  };
+  ASSERT_TRUE(tried(BeadChannel::blue));
+  EXPECT_EQ(tried(BeadChannel::blue)->beads, places.size());
+  EXPECT_FALSE(tried(BeadChannel::red));
+  EXPECT_FALSE(reduced_for_trials({(folder / "none.ppm").string(), 440, 320, {}, nullptr}, 30));
 }
 
 }  // namespace

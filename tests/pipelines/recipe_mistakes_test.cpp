@@ -624,6 +624,7 @@ TEST(OptionsOfEveryKind, AreRefusedWithTheirPlaces) {
             "/at/leaves/1: expected an object, got the number 3");
   EXPECT_EQ(told_of(R"("named": {"a/b": {"dept": 1}})"),
             "/at/named/a~1b/dept: unknown key \"dept\". Did you mean \"depth\"?");
+  EXPECT_EQ(told_of(R"("named": {"a": {}, "a/b": 3})"), "/at/named/a~1b: expected an object, got the number 3");
   EXPECT_EQ(told_of(R"("zzzzzzzz": 1)").substr(0, 62),
             "/at/zzzzzzzz: unknown key \"zzzzzzzz\". Choose from: number, qua");
   EXPECT_EQ(read_everything(R"({ "quantity": 1, "side": "left", "length": 1 })").told,
@@ -639,6 +640,19 @@ TEST(OptionsOfEveryKind, AreRefusedWithTheirPlaces) {
             "In reduced "
             "units lengths are in D, "
             "masses in m, and g or the starting T is 1");
+}
+
+TEST(Ranges, AreNamedByTheirEnds) {
+  const auto words = [](double low, double high, bool above_low, bool below_high) {
+    return Range{.low = low, .high = high, .above_low = above_low, .below_high = below_high}.words();
+  };
+  EXPECT_EQ(words(1, 2, false, false), "from 1 to 2");
+  EXPECT_EQ(words(1, 2, true, true), "above 1 and below 2");
+  EXPECT_EQ(words(1, INFINITY, true, false), "above 1");
+  EXPECT_EQ(words(1, INFINITY, false, false), "1 or more");
+  EXPECT_EQ(words(-INFINITY, 2.5, false, true), "below 2.5");
+  EXPECT_EQ(words(-INFINITY, 2.5, false, false), "2.5 or less");
+  EXPECT_EQ(words(-INFINITY, INFINITY, false, false), "");
 }
 
 TEST(OptionsOfEveryKind, HaveASchema) {

@@ -603,6 +603,62 @@ TEST_F(RunsByHand, NameTheirRecipe) {
                   {"settings", Json{{"/a/b", Json::array({1, 2})}, {"/c", "3 mm"}}}}));
 }
 
+// What a sweep says on standard error, with the scratch folder as HERE.
+std::string said_so_far(const ScratchFolder& folder) {
+  std::string said = testing::internal::GetCapturedStderr();
+  testing::internal::CaptureStderr();  // the fixture ends it
+  const std::string here = folder.path().string();
+  for (std::size_t at = 0; (at = said.find(here)) != std::string::npos;) said.replace(at, here.size(), "HERE");
+  return said;
+}
+
+TEST_F(SweepsByHand, LeaveOutWhatOthersRun) {
+  const Plan plan = gammas("[2, 3, 4]");
+  std::filesystem::create_directories(folder_ / "o/points/000001");
+  {
+    const FolderLock lock(folder_ / "o/points/000001");
+    EXPECT_EQ(sweep(plan), exit_ok);
+  }
+  EXPECT_EQ(arguments_.result["done"], 2);
+  EXPECT_EQ(arguments_.result["missing"], 1);
+  EXPECT_EQ(arguments_.result["failed"], 0);
+  EXPECT_EQ(pages_.table[2][2], "missing");
+  EXPECT_THAT(said_so_far(folder_), HasSubstr("warning: 1 points were skipped because another process is running them. "
+                                              "Run again when it has ended\n"));
+  EXPECT_EQ(sweep(plan), exit_ok);
+  EXPECT_EQ(arguments_.result["done"], 3);
+  EXPECT_THAT(said_so_far(folder_), testing::Not(HasSubstr("skipped")));
+}
+
+// Pages that cannot be written take no numbers with them.
+TEST_F(SweepsByHand, AreThereWithoutTheirPages) {
+  class FullDisk : public Pages {
+   public:
+    void write(const Plan&, const RunOutcome&) const override { throw StageError("a point's page: disk full"); }
+    void write(const Plan&, const SweepOutcome&) const override { throw StageError("the sweep's page: disk full"); }
+  };
+  const Plan plan = gammas("[2, 3]");
+  EXPECT_EQ(run_sweep_command(plan, options(), arguments_, FullDisk(), console_), exit_ok);
+  const std::string said = said_so_far(folder_);
+  for (const char* point : {"000000", "000001"})
+    EXPECT_THAT(said, HasSubstr("warning: HERE/o/points/" + std::string(point) +
+                                ": the report page of this point could not be written: a point's page: disk full\n"));
+  EXPECT_THAT(said, HasSubstr("warning: the sweep is complete, but its report could not be written: the sweep's page: "
+                              "disk full\n"));
+  EXPECT_THAT(read_text(folder_ / "o/sweep.csv"), HasSubstr("\n000001,0,ok,3,3,\n"));
+}
+
+// A file is in the way of the folder.
+TEST_F(SweepsByHand, NameTheFolderThatCannotBeMade) {
+  write_text(folder_ / "o", "");
+  try {
+    sweep(gammas("[2]"));
+    FAIL();
+  } catch (const StageError& error) {
+    EXPECT_EQ(error.what(), (folder_ / "o").string() + ": this folder cannot be created: Not a directory");
+  }
+}
+
 // --- jobs for a cluster
 
 // Slurm whose programs note how they are called; sbatch gives the ids 11, 12, ...
@@ -678,6 +734,26 @@ TEST_F(SlurmByHand, IsAskedForWhatIsMissing) {
     EXPECT_THAT(error.what(), HasSubstr("sbatch did not accept the job (exit code 1): refused"));
   }
   EXPECT_THROW(submit_slurm(this->plan(map_of("4")), given, console_), UsageError);
+}
+
+TEST_F(SlurmByHand, IsNotedForPrograms) {
+  SlurmOptions given;
+  given.shards = 2, given.out = folder_ / "o", given.json = true;
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(submit_slurm(gammas("[2, 3, 4]"), given, console_), exit_ok);
+  std::fflush(stdout);
+  const std::string said = testing::internal::GetCapturedStdout();
+  EXPECT_EQ(Json::parse(said),
+            Json::parse(R"({"job": "11", "gather_job": "12", "tasks": 2, "points": 3, "to_run": 3})"));
+  EXPECT_EQ(said, read_text(folder_ / "o/slurm/submitted.json"));
+  write_text(folder_ / "p", "");
+  given.out = folder_ / "p";
+  try {
+    submit_slurm(gammas("[2]"), given, console_);
+    FAIL();
+  } catch (const StageError& error) {
+    EXPECT_EQ(error.what(), (folder_ / "p/slurm").string() + ": this folder cannot be created: Not a directory");
+  }
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "pipelines/stages/study_numbers.hpp"
 #include "pipelines/stages/study_table.hpp"
 #include "tests/pipelines/decoded_scene.hpp"
+#include "tests/pipelines/lone_stage.hpp"
 #include "tests/pipelines/program.hpp"
 
 namespace {
@@ -41,6 +42,28 @@ std::string mistake_of(const Work& work) {
     return error.what();
   }
   return "none";
+}
+
+// --- stages in "from"
+
+TEST(StagesInFrom, AreFoundByKindOrId) {
+  LoneStage fit(*find_stage("fit"));
+  fit.add_input("one", *find_stage("simulate"), "1");
+  EXPECT_EQ(fit.input("simulate").id, "one");
+  EXPECT_EQ(fit.input_from("").id, "one") << "the only one needs no name";
+  EXPECT_EQ(mistake_of([&] { fit.input("extract"); }),
+            "this stage needs the result of a stage of kind \"extract\": name one in \"from\"");
+  fit.add_input("two", *find_stage("simulate"), "2"), fit.add_input("film", *find_stage("extract"), "3");
+  EXPECT_EQ(fit.input("extract").id, "film");
+  EXPECT_EQ(fit.input_from("two").id, "two");
+  EXPECT_EQ(mistake_of([&] { fit.input("simulate"); }),
+            "\"from\" names 2 stages of kind \"simulate\", but this stage reads only one");
+  EXPECT_EQ(mistake_of([&] { fit.input_from("tow"); }), "\"tow\" is not in the \"from\" of this stage");
+  EXPECT_EQ(mistake_of([&] { fit.input_from(""); }), "\"\" is not in the \"from\" of this stage");
+  write_text(fit.file("2/bed.json"), "{}");
+  EXPECT_EQ(fit.input_from("two").file("bed.json"), fit.file("2/bed.json"));
+  EXPECT_EQ(mistake_of([&] { fit.input_from("one").file("bed.json"); }),
+            "the stage \"one\" (simulate) has not written the file bed.json");
 }
 
 TEST(FloorTableMistakes, AreNamedWithTheirLine) {

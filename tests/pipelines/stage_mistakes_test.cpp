@@ -265,6 +265,14 @@ TEST_F(InferMistakes, OfItsParametersAndBeds) {
   EXPECT_THAT(with({{"parameters", {{"e", {{"set", {"/measure"}}, {"low", 0.5}, {"high", 0.9}}}}}}),
               HasSubstr("/stages/0/parameters/e/set: \"/measure\" is not an option of the scene. Write for example "
                         "\"/floor/gamma\""));
+  const Json table{{"motion", "table"}, {"heights", {0, 1, 0, -1}}, {"period", 2.857}, {"restitution", 0.7}};
+  const auto height = [&](const char* pointer) {
+    return with({{"floor", table}, {"parameters", {{"h", {{"set", {pointer}}, {"low", 0.5}, {"high", 0.9}}}}}});
+  };
+  EXPECT_EQ(height("/floor/heights/1"), "");
+  EXPECT_EQ(height("/floor/heights/9"),
+            "/stages/0/parameters: /floor/heights/9: there is no element \"9\" in /floor/heights (it has 4) (at h = "
+            "0.5)");
   write_text(folder_ / "b.json", R"({ "beds": [] })");
   EXPECT_EQ(with({{"beds", "b.json"}, {"stored", "x"}}),
             "/stages/0/beds: beds are either stored or your own: give one of \"stored\" and \"beds\"");
@@ -356,6 +364,12 @@ TEST_F(StageMistakes, OfMapsAndPictures) {
   EXPECT_EQ(said_of(R"({ "stage": "map", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10,
                       "table": ["p.csv", "q.csv"] })"),
             "/stages/0/table: this names 2 files, but the stage reads one table. Give the path of one CSV file");
+  const auto map = [&](const std::string& keys) {
+    return said_of(R"({ "stage": "map", "frequency": "20 Hz", "diameter": "3 mm", "initial_height": 10, )" + keys +
+                   " }");
+  };
+  EXPECT_EQ(map(R"("gamma": 4, "equation": "enskgo")"),
+            "/stages/0/equation: there is no equation of state \"enskgo\"; did you mean \"enskog\"?");
   const auto render = [&](const std::string& keys, const std::string& frames) {
     return said_of(bed(shaken + frames) + R"(, { "stage": "render", "from": "bed", )" + keys + " }");
   };
@@ -442,6 +456,25 @@ TEST_F(StageMistakes, OfWhatAStudyMayRun) {
       study(map + R"(, { "stage": "chart", "from": "f", "charts": [ { "name": "c", "x_label": "x", "y_label": "y",
       "points": [ { "name": "p", "file": "map.csv", "x": "jump", "y": "rise" } ] } ] })"),
       HasSubstr("the chain of a study cannot contain a chart stage. Put it after the study"));
+}
+
+// What is set must be a place in the chain, in the series that has it, and what is tabulated a file of a stage.
+TEST_F(StageMistakes, OfTheChainOfAStudy) {
+  const auto study = [&](const std::string& set, const std::string& table) {
+    return said_of(R"({ "stage": "study", "series": { "a": {}, "b/c": { "set": { )" + set + R"( } } },
+           "stages": [ { "stage": "map", "id": "f", "gamma": 4, "frequency": "20 Hz", "diameter": "3 mm",
+                         "initial_height": 10 } ],
+           "parameter": { "name": "g", "values": [4], "set": ["/stages/f/gamma"] },
+           "collect": { "t": { "at": "/f/initial_height" } },
+           "tables": { "t": { "at": ")" +
+                   table + R"(", "key": "name" } } })");
+  };
+  EXPECT_EQ(study("", "/f/map.csv"), "");
+  EXPECT_EQ(study(R"("/stages/nobody/gamma": 3)", "/f/map.csv"),
+            "/stages/0/series/b~1c: /stages/nobody/gamma: there is no element \"nobody\" in /stages (it has 1)");
+  for (const char* none : {"f/map.csv", "/f", "/g/map.csv", "/f/map.csv/name", "/f~2/map.csv"})
+    EXPECT_EQ(study("", none), "/stages/0/tables/t/at: \"" + std::string(none) +
+                                   "\" is not a file of the study's stages. Write /<stage id>/<file>.csv");
 }
 
 }  // namespace

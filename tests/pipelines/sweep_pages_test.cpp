@@ -240,6 +240,19 @@ TEST_F(SweepPages, SummaryHoldsTheTable) {
             "| point | replica | status | column | T | T\\_error | verdict |\n|---|---|---|---|---|---|---|\n");
 }
 
+// A text of the report is shown in place of the description.
+TEST_F(SweepPages, EndWithTheirTextOrDescription) {
+  const std::string sweep = R"({ "over": { "/stages/fit/column_number": [10, 12] }, "collect": [] })",
+                    described = R"("description": "why <it> was done", )";
+  read(sweep, described);
+  write();
+  EXPECT_THAT(page_, HasSubstr("<p>why &lt;it&gt; was done</p>\n"));
+  read(sweep, described + R"("report": { "text": ["what was found"] }, )");
+  write();
+  EXPECT_THAT(page_, HasSubstr("<p>what was found</p>\n"));
+  EXPECT_THAT(page_, Not(HasSubstr("why &lt;it&gt;")));
+}
+
 // Up to 40 columns. All cells alike are in the middle of the colours, a point that failed is an empty cell, and points
 // at random have no map.
 TEST_F(SweepPages, HoldMapsOfGridsAlone) {
