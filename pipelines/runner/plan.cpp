@@ -373,9 +373,42 @@ class PlanBuilder {
         check(list->is_array() ? pointer_join("/sweep/collect", i) : "/sweep/collect", plan_.sweep->collect[i]);
     }
     const std::vector<PublishedNumber>& published = plan_.report.published;
-    for (std::size_t i = 0; i < published.size(); ++i)
-      if (!published[i].pointer.empty()) check(pointer_join("/report/published", i) + "/number", published[i].pointer);
+    for (std::size_t i = 0; i < published.size(); ++i) {
+      if (published[i].pointer.empty()) continue;
+      check(pointer_join("/report/published", i) + "/number", published[i].pointer);
+      check_published_unit(stated, i);
+    }
     for (std::size_t i = 0; i < plan_.report.assumed.size(); ++i) check_assumed(i);
+  }
+
+  // Ours is shown in the unit of the published value, so it must have one of the same kind.
+  void check_published_unit(const std::vector<StatedStage>& stated, std::size_t i) {
+    const PublishedNumber& number = plan_.report.published[i];
+    const StatedResult* ours = nullptr;
+    for (const StatedStage& stage : stated) {
+      const std::string below = pointer_join("", stage.id);
+      if (stage.results != nullptr && number.pointer.starts_with(below + "/"))
+        ours = stage.results->find(number.pointer.substr(below.size()));
+    }
+    if (ours == nullptr || (ours->kind != ResultKind::quantity && ours->kind != ResultKind::number)) return;
+    const std::string where = pointer_join("/report/published", i) + "/value";
+    Quantity printed, unit;
+    try {
+      printed = parse_quantity(number.value);
+    } catch (const std::invalid_argument&) {
+      return;  // this has been said
+    }
+    if (!printed.has_unit) return;
+    try {
+      unit = parse_quantity("1 " + ours->unit);
+    } catch (const std::invalid_argument&) {
+      return problem(*find_pointer(plan_.document, where), where,
+                     fmt::format("the result is in \"{}\", so the published value must be a plain number", ours->unit));
+    }
+    if (unit.dimension != printed.dimension)
+      problem(*find_pointer(plan_.document, where), where,
+              fmt::format("the result is in \"{}\", but the published value is {}", ours->unit,
+                          name_of(printed.dimension)));
   }
 
   // An input that had to be assumed is one that the recipe states, or leaves at its default.

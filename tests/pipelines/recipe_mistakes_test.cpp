@@ -197,6 +197,14 @@ TEST(RecipeMistakes, OfPointersAreNamed) {
   EXPECT_EQ(published("/map/gamma"), "");
   EXPECT_THAT(published("/mapp/gamma"), HasSubstr("/report/published/0/number: "));
   EXPECT_THAT(published("/map/gamma", "x"), HasSubstr("/report/published/0/value: \"x\" does not begin with a number"));
+  EXPECT_EQ(published("/map/critical_temperature", "0.36 mm"),
+            "/report/published/0/value: the result is in \"m g D\", so the published value must be a plain number");
+  EXPECT_EQ(published("/map/critical_temperature", "0.1"), "");
+  EXPECT_EQ(published("/map/diameter", "3 Hz"),
+            "/report/published/0/value: the result is in \"m\", but the published value is a frequency");
+  EXPECT_EQ(published("/map/diameter", "0.3 cm"), "");
+  EXPECT_EQ(published("/map/gamma", "4 mm"),
+            "/report/published/0/value: the result is in \"1\", but the published value is a length");
   const auto collect = [&](const std::string& list) {
     return told(with(map_stage(), R"("sweep": { "over": { "/stages/map/gamma": [1] }, "collect": )" + list + " }, "));
   };
