@@ -437,6 +437,18 @@ TEST(Trajectory, EveryTruncationIsAnErrorOrFewerFrames) {
   }
 }
 
+TEST(Trajectory, OfPlainTextIsNotACompressedOne) {
+  ScratchFolder folder;
+  write_text(folder / "t.extxyz.zst", "1\nProperties=pos:R:2 Time=3\n0.5 0.7\n");
+  try {
+    count_frames(folder / "t.extxyz.zst");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::StartsWith((folder / "t.extxyz.zst").string() +
+                                                  ":0: this is not a file compressed with zstd: "));
+  }
+}
+
 TEST(Trajectory, ReadsTwoDimensionalPositionsAndUnknownColumns) {
   ScratchFolder folder;
   write_text(folder / "t.extxyz",

@@ -424,6 +424,33 @@ TEST(ExtractedPhotographs, AreReducedToThreePixelsAtMost) {
   EXPECT_EQ(refusal_of(frames), "none");
 }
 
+// Circles below lines on even paper are those of a drawing: they are measured where any shape is asked for.
+TEST(ExtractedPhotographs, OfADrawingAreMeasuredOnDemand) {
+  ExtractedPhotograph drawn;
+  PaintedPicture plot(150, 190);
+  for (int row = 5; row <= 55; row += 10) plot.box(0, row, 150, 1, 0);
+  write_text(drawn.stage.file("a.pgm"), plot.disks(lattice(10, 5, 20, 122, 178, 0.02), 10, 60).pgm());
+  drawn.options.shape = BeadShape::any;
+  EXPECT_EQ(drawn.extracted()["frames_used"], 1);
+  EXPECT_THAT(drawn.stage.warnings,
+              Contains(drawn.stage.file("a.pgm").string() +
+                       ": areas of one grey level without noise are seen, as in a drawing, and the circles are only "
+                       "a small part of it. The circles are measured because shape is \"any\"."));
+}
+
+TEST(ExtractedPhotographs, ObjectToTwoDiameters) {
+  ExtractedPhotograph both;
+  write_text(both.stage.file("a.pgm"), PaintedPicture(250, 130)
+                                           .disks(lattice(10, 5, 20, 122, 118, 0.02), 10, 60)
+                                           .disks(lattice(7, 6, 130, 232, 118, 0.02), 7, 60)
+                                           .blur(0.7)
+                                           .noise(2)
+                                           .pgm());
+  both.options.second_diameter = 0.0028, both.options.radius = 10;
+  EXPECT_THAT(reasons_of(both.extracted()),
+              Contains("The bed contains beads of two diameters, but the theory describes equal disks."));
+}
+
 // The number of beads is known after the measurement only: what was tried then is said, with a page that shows it.
 TEST(ExtractedPhotographs, AreRefusedAfterTheirMeasurementWithAdvice) {
   ExtractedPhotograph photograph;

@@ -119,6 +119,26 @@ TEST_F(InferBed, WritesTheRangesThatAreAskedFor) {
   EXPECT_EQ(stage["kernel_width"], 0.5);
 }
 
+// Gamma as the amplitude of the floor in the film says, five errors to each side; the number of beads as it is given.
+TEST_F(InferBed, TakesGammaFromTheFilm) {
+  const ProgramResult ran = infer("g", {"--frequency", "20 Hz", "--frame-rate", "480 Hz", "--bead-number", "59",
+                                        "--only", "figure", "--set", "/stages/extract/overlays=0"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.err;
+  const Json stage = read_json(*folder_ / "g/resolved.json")["stages"].back(),
+             extract = read_json(*folder_ / "g/extract/extract.json");
+  EXPECT_EQ(stage["disks"]["count"], 59);
+  const double amplitude = value(extract["floor_amplitude"]), gamma = amplitude * std::pow(40 * M_PI, 2) / 9.81,
+               spread = gamma * error(extract["floor_amplitude"]) / amplitude;
+  EXPECT_NEAR(gamma, 4, 1);
+  const Json& parameter = stage["parameters"]["gamma"];
+  EXPECT_NEAR(parameter["mean"].get<double>(), gamma, 1e-9);
+  EXPECT_NEAR(parameter["std_error"].get<double>(), spread, 1e-9);
+  EXPECT_NEAR(parameter["low"].get<double>(), std::max(gamma / 2, gamma - 5 * spread), 1e-9);
+  EXPECT_NEAR(parameter["high"].get<double>(), gamma + 5 * spread, 1e-9);
+  EXPECT_EQ(parameter["why"], "the amplitude of the floor in the film");
+  EXPECT_NEAR(stage["floor"]["gamma"].get<double>(), gamma, 1e-9);
+}
+
 TEST_F(InferBed, SaysWhatIsMissing) {
   const auto refused = [](const std::vector<std::string>& more, int code, const std::string& words) {
     const ProgramResult ran = infer("wrong", more, "hidden/film/frames/000000.png");
@@ -130,6 +150,10 @@ TEST_F(InferBed, SaysWhatIsMissing) {
   refused({"--kernel", "top_hat:1"}, 2, "--kernel: the beds of an inference are measured through a Gaussian");
   refused({"--frequency", "20"}, 2, "has no unit");
   refused({}, 5, "the frequency of the shaking is not known. Give --frequency");
+  refused(
+      {"--frequency", "20 Hz"}, 5,
+      "the density exceeds twice its error only up to 0.5 D, and an inference needs 3.5 D. Give more photographs of "
+      "the bed (here 1) or a longer film");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "pipelines/formats/json.hpp"
 #include "pipelines/formats/process.hpp"
+#include "tests/pipelines/painted_picture.hpp"
 #include "tests/pipelines/program.hpp"
 #include "tests/pipelines/read_table.hpp"
 
@@ -205,9 +206,16 @@ TEST_F(ImageCommands, SayWhyTheirPilotFailed) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "o/extract"));
 }
 
+// Its page repeats them in the command of the run.
 TEST_F(ImageCommands, APreviewReadsEveryLength) {
-  EXPECT_THAT(refused(with({"--preview", "--second-diameter", "2 s"})),
-              HasSubstr("--second-diameter: \"2 s\" is a time, but a length is needed"));
+  write_text(folder_ / "a.pgm",
+             PaintedPicture(150, 130).disks(lattice(10, 5, 20, 122, 118, 0.02), 10, 60).blur(0.7).noise(2).pgm());
+  const ProgramResult ran = run({"fit-images", "a.pgm", "--diameter", "4 mm", "--second-diameter", "2.5 mm", "--scale",
+                                 "0.2 mm/px", "--preview", "--out", "v"});
+  EXPECT_EQ(ran.exit_code, 0) << ran.err;
+  EXPECT_THAT(read_text(folder_ / "v/preview.html"),
+              HasSubstr("a.pgm --diameter &quot;4 mm&quot; --second-diameter &quot;2.5 mm&quot; --scale &quot;0.2 "
+                        "mm/px&quot; "));
 }
 
 // --- shipped recipes, points of your own, clusters

@@ -173,6 +173,11 @@ TEST(CandidatesOfAPicture, AreOptionsOfTheCommand) {
   EXPECT_EQ(options.shape, BeadShape::any);
   one.not_round = false, one.why_drawn = "a plot";
   EXPECT_EQ(options_for(one), "--polarity dark --radius 22.30 --shape any");
+  one.why_drawn.clear(), one.region = {11, 12, 130, 140};
+  EXPECT_EQ(options_for(one), "--polarity dark --radius 22.30 --roi 11,12,130,140");
+  EXPECT_THAT(options.roi, IsEmpty());
+  take_candidate(one, options);
+  EXPECT_THAT(options.roi, ElementsAre(11, 12, 130, 140));
   for (const auto& [channel, same] : {std::pair{BeadChannel::red, ingest::Channel::red},
                                       {BeadChannel::saturation, ingest::Channel::saturation},
                                       {BeadChannel::background_distance, ingest::Channel::background_distance},

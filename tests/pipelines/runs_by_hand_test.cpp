@@ -303,6 +303,9 @@ TEST_F(SweepsByHand, RunEveryPointOnce) {
   const VerifyResult changed = verify_output(folder_ / "o");
   EXPECT_THAT(changed.problems, ElementsAre(testing::MatchesRegex("shared/.*/map/map.json: changed since the run")));
   EXPECT_EQ(changed.files, 1 + 2 * read_record(folder_ / "o/points/000000/map")->outputs.size());
+  std::filesystem::remove(std::filesystem::canonical(folder_ / "o/points/000002/map") / "map.json");
+  EXPECT_THAT(verify_output(folder_ / "o").problems,
+              ElementsAre(testing::MatchesRegex("shared/.*/map/map.json: missing")));
   EXPECT_TRUE(sweep_status(folder_ / "nothing").is_null());
 }
 
@@ -628,6 +631,21 @@ TEST_F(SweepsByHand, LeaveOutWhatOthersRun) {
   EXPECT_EQ(sweep(plan), exit_ok);
   EXPECT_EQ(arguments_.result["done"], 3);
   EXPECT_THAT(said_so_far(folder_), testing::Not(HasSubstr("skipped")));
+}
+
+// A record that was cut off is none: its point runs again, and the others do not.
+TEST_F(SweepsByHand, RepeatAPointWhoseRecordIsDamaged) {
+  const Plan plan = gammas("[2, 3]");
+  EXPECT_EQ(sweep(plan), exit_ok);
+  const std::string record = read_text(folder_ / "o/points/000001/.point");
+  for (const std::string& damaged : {record.substr(0, record.size() / 2), std::string("[1]")}) {
+    write_text(folder_ / "o/points/000001/.point", damaged);
+    EXPECT_EQ(sweep_status(folder_ / "o"), Json::parse(R"({"points": 2, "done": 1, "failed": 0, "left_over": 0})"));
+    pages_.runs = 0;
+    EXPECT_EQ(sweep(plan), exit_ok);
+    EXPECT_EQ(pages_.runs, 1);
+    EXPECT_EQ(read_text(folder_ / "o/points/000001/.point"), record);
+  }
 }
 
 // Pages that cannot be written take no numbers with them.
