@@ -54,8 +54,6 @@ inline constexpr int deepest_nesting = 64;
 // invalid UTF-8 are problems.
 std::optional<JsonNode> parse_json(std::string_view text, const std::string& file, std::vector<Problem>& problems);
 
-// The same from a file. Throws InputError when it cannot be read, ConfigError when it is no good JSON.
-JsonNode read_json_node(const std::filesystem::path& path);
 // Reads a result file, written by shakebed or by the user. Throws InputError.
 Json read_json(const std::filesystem::path& path);
 

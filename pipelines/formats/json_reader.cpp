@@ -285,13 +285,6 @@ std::string read_text(const std::filesystem::path& path) {
 }
 }  // namespace
 
-JsonNode read_json_node(const std::filesystem::path& path) {
-  std::vector<Problem> problems;
-  auto node = parse_json(read_text(path), path.string(), problems);
-  if (!problems.empty()) throw ConfigError(std::move(problems));
-  return std::move(*node);
-}
-
 Json read_json(const std::filesystem::path& path) {
   std::vector<Problem> problems;
   const auto node = parse_json(read_text(path), path.string(), problems);
