@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "pipelines/formats/bed.hpp"
+#include "pipelines/formats/trajectory.hpp"
 #include "pipelines/report/crate.hpp"
 #include "pipelines/report/report.hpp"
 #include "tests/pipelines/program.hpp"
@@ -83,6 +85,39 @@ TEST_F(ReportPage, DrawsItsStages) {
   EXPECT_THAT(graph, HasSubstr("<path d=\"M132 109C156 109 150 35 174 35\"/>"));
   EXPECT_THAT(graph, HasSubstr("<path d=\"M132 109C156 109 316 35 340 35\"/>"));
   EXPECT_THAT(graph, HasSubstr("<path d=\"M298 35C322 35 316 35 340 35\"/>"));
+}
+
+// A page needs neither a trajectory nor a result that can be read: it is shown without them.
+TEST_F(ReportPage, LeavesOutWhatIsDamaged) {
+  read();
+  outcome_.stages[1].record.emplace();
+  const std::filesystem::path bed = folder_ / "a-bed-of-14-xx";
+  std::filesystem::create_directories(bed);
+  BedDescription description;
+  description.count = 2, description.diameter = 0.003, description.width = 0.019, description.gravity = 9.81;
+  description.frequency = 20, description.amplitude = 0.002;
+  write_text(bed / "bed.json", dump(description.to_json()));
+  write_text(bed / "observables.json", R"({ "temperature_x": { "value": 0.5, "std_error": 0.01, "unit": "m g D" } })");
+  TrajectoryFrame frame;
+  frame.width = 6;
+  for (const double x : {1.0, 4.0}) frame.x.push_back(x), frame.z.push_back(1), frame.vx.push_back(0);
+  frame.vz = frame.vx;
+  TrajectoryWriter writer(bed / "trajectory.extxyz");
+  for (int k = 0; k < 3; ++k) frame.time = k, writer.write(frame);
+  writer.close();
+  const std::string motion = "data-positions=", temperature = "kinetic T<sub>x</sub> of the simulated disks";
+  write();
+  EXPECT_THAT(page_, HasSubstr(motion));
+  EXPECT_THAT(page_, HasSubstr(temperature));
+  const std::string whole = read_text(bed / "trajectory.extxyz");
+  write_text(bed / "trajectory.extxyz", whole.substr(0, whole.size() / 2));
+  write();
+  EXPECT_THAT(page_, Not(HasSubstr(motion)));
+  EXPECT_THAT(page_, HasSubstr(temperature));
+  write_text(bed / "observables.json", "{");
+  write();
+  EXPECT_THAT(page_, Not(HasSubstr(temperature)));
+  EXPECT_THAT(page_, HasSubstr("a-bed-of-14-xx</text>")) << "the stage itself is on the page";
 }
 
 // 24 files of a stage are named; text of up to 120 kB is inside the page as long as this holds 600 kB.
@@ -223,7 +258,7 @@ TEST_F(ReportPage, SaysHowTheRunEnded) {
 // as wide as its longest label, 24 and 14 letters.
 TEST_F(ReportPage, HasPublishedAndAssumedNumbers) {
   read(R"("description": "why & what", "report": { "title": "T_c", "published": [
-      { "number": "/map/gamma", "label": "a long label", "value": "1.5 mm", "place": "Fig. 2" },
+      { "number": "/map/diameter", "label": "a long label", "value": "1.5 mm", "place": "Fig. 2" },
       { "number": "/map/gamma", "label": "b", "value": "2", "beside_answer": true },
       { "number": "/map/gamma", "label": "c", "value": "3" } ],
     "assumed": [ { "input": "/stages/map/frequency", "why": "not printed" },
