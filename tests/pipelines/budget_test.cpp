@@ -613,7 +613,9 @@ class GivenPilots : public Stage, public Scalable {
     return pilots_.at(static_cast<std::size_t>(effort.refinement));
   }
   EffortReading read(const Effort& effort, const Json& /*result*/, const Json& /*timings*/) const override {
-    return {.effort = effort};
+    EffortReading reading;
+    reading.effort = effort;
+    return reading;
   }
 
  private:

@@ -300,7 +300,6 @@ TEST(ExtractedFrames, MarkWhatIsMissedAndWhatIsNone) {
   const std::size_t last = truth.rfind("\n1,24,");
   ASSERT_NE(last, std::string::npos);
   write_text(frames.stage.file("r/truth.csv"), truth.substr(0, last) + "\n1,24,75.123,16.46,10\n");
-  const NumberTable written(frames.stage.file("r/truth.csv"));
   frames.options.overlays = 1;
   const Json found = frames.extracted();
   EXPECT_DOUBLE_EQ(found["truth"]["recall"].get<double>(), 49.0 / 50);
@@ -410,7 +409,6 @@ std::string refusal_of(Photograph& photograph) {
 TEST(ExtractedPhotographs, AreReducedToThreePixelsAtMost) {
   ExtractedPhotograph photograph;
   photograph.options.radius = 10, photograph.options.reduction = 4;
-  const std::string folder = photograph.stage.file("").string();
   EXPECT_THAT(
       refusal_of(photograph),
       testing::MatchesRegex(".*a.pgm: averaged over squares of 4 px \\(reduction\\), a bead of (9.[6-9][0-9]*|10|"
