@@ -54,9 +54,9 @@ AuditStatus to_the_digits(double printed, double recomputed, double last_digit) 
   return std::abs(recomputed - printed) <= 0.5000001 * last_digit ? AuditStatus::agrees : AuditStatus::open;
 }
 
-// mu_0 and Lambda_1 at 2/sqrt 3 with another a in the pair function.
+// Lambda_1 at 2/sqrt 3 with another a in the pair function.
 struct OtherAlpha {
-  double alpha = 0.0, mu_0 = 0.0, lambda_1 = 0.0;
+  double alpha = 0.0, lambda_1 = 0.0;
 };
 
 double compressibility_with_alpha(double phi, double alpha) {
@@ -76,7 +76,6 @@ OtherAlpha alpha_that_gives(double mu_0) {
   OtherAlpha other;
   other.alpha = 0.5 * (low + high);
   const double z = compressibility_with_alpha(close_packing_density, other.alpha);
-  other.mu_0 = close_packing_density * z;
   double square = 0.0;
   constexpr int panels = 32;
   for (int i = 0; i < panels; ++i) {

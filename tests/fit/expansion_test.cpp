@@ -93,6 +93,7 @@ TEST(Expansion, HasAStatusAtPolesAndOutsideRanges) {
   EXPECT_EQ(at_close_packing("kolafa-rottner").status, ValueStatus::outside_range);
   for (const EquationOfState* equation : equations_of_state()) {
     const ExpansionConstants c = expansion_constants(*equation, close_packing_density);
+    EXPECT_EQ(c.plateau_density, close_packing_density);
     if (c.ok()) continue;
     EXPECT_EQ(c.mu_0, 0.0);
     EXPECT_EQ(c.k, 0.0);
@@ -101,6 +102,7 @@ TEST(Expansion, HasAStatusAtPolesAndOutsideRanges) {
   }
   EXPECT_EQ(expansion_constants(enskog(), 0.0).status, ValueStatus::invalid_argument);
   EXPECT_EQ(expansion_constants(enskog(), -1.0).status, ValueStatus::invalid_argument);
+  EXPECT_EQ(expansion_constants(enskog(), -1.0).plateau_density, -1.0);
   EXPECT_EQ(expansion_constants(enskog(), 1.3).status, ValueStatus::outside_range);
   const Column column{11.22, 1.1};
   for (const double wrong : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {

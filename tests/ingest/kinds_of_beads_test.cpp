@@ -544,6 +544,13 @@ TEST(FacesWithoutARim, AreBeadsAmongBeads) {
 
 // A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii of the beads. Here four
 // beads leave room for no more than the one between them.
+TEST(MissedBeads, AreAShareOfAllBeads) {
+  EXPECT_DOUBLE_EQ(share_of_missed(3, 7), 0.3);
+  EXPECT_DOUBLE_EQ(share_of_missed(1.1, 0), 1);
+  EXPECT_DOUBLE_EQ(share_of_missed(0.4, 0), 0.4) << "less than one bead in all";
+  EXPECT_EQ(share_of_missed(0, 0), 0);
+}
+
 TEST(MissedBeads, CountByTheirArea) {
   const auto missed = [](double radius) {
     std::vector<RenderedDisk> truth = strewn_disks(4, 4, 26, 9);

@@ -102,6 +102,16 @@ TEST(Photographs, LevelsAreTheSameInAllTypesAndRowLengths) {
 TEST(Photographs, AnImageThatCannotBeUsedIsNamed) {
   GrayFrame frame = drawn(1);
   EXPECT_EQ(find_disks(ImageView{}).status, FindStatus::bad_input);
+  const auto told = [&](int width, int height, const void* pixels) {
+    ImageView view = view_of(frame);
+    view.width = width, view.height = height, view.pixels = pixels;
+    return find_disks(view).message;
+  };
+  EXPECT_EQ(told(0, 240, frame.pixels.data()), "the image is empty");
+  EXPECT_EQ(told(300, 0, frame.pixels.data()), "the image is empty");
+  EXPECT_EQ(told(300, 240, nullptr), "the image is empty");
+  EXPECT_NE(told(1, 240, frame.pixels.data()), "the image is empty") << "it shows no bead";
+  EXPECT_NE(told(300, 1, frame.pixels.data()), "the image is empty");
   frame.pixels[1234] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(find_disks(view_of(frame)).message, "the image contains levels that are not finite numbers; replace them");
   const GrayFrame good = drawn(2);

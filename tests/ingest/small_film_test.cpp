@@ -180,6 +180,12 @@ TEST(SmallFilm, HasItsSurfaceInViewWhereEveryFrameCutsOneBead) {
   ASSERT_EQ(found.disks.size(), 25U);
   EXPECT_FALSE(found.surface_out_of_view);
   EXPECT_FALSE(found.column_known);
+  // The same at the lower border.
+  std::vector<RenderedDisk> low = four_rows();
+  low.push_back({72, 128, 8, 0, 0});
+  options.floor_px.reset();
+  const Measurement below = measured({small_frame(low)}, options);
+  EXPECT_FALSE(below.floor_out_of_view);
 }
 
 // A bed that goes up and down by 4 px, without a frame rate: half of the range is the floor's error, or half of the

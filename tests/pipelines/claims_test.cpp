@@ -92,6 +92,10 @@ TEST_F(ClaimsVerdicts, WhatWasNotMeasured) {
 
 TEST_F(ClaimsVerdicts, ArePutInWords) {
   const Json row = one("/bed/t", R"("value": 1, "tolerance": 0.2)");
+  EXPECT_FALSE(row.contains("place") || row.contains("note") || row.contains("measured_as"));
+  const Json placed = one("/bed/t", R"("value": 1, "place": "Fig. 1", "note": "why")");
+  EXPECT_EQ(placed["place"], "Fig. 1");
+  EXPECT_EQ(placed["note"], "why");
   EXPECT_EQ(row["claimed"], "1 ± 0.2");
   EXPECT_EQ(row["measured"], "1.00 ± 0.10 m g D");
   EXPECT_EQ(row["value"], 1.0);

@@ -597,20 +597,21 @@ TEST(OrderByHand, IsAveragedOverDisksAndLooks) {
 
 // A crystal with one site empty across the periodic corner has it once, wherever the corner is.
 TEST(OrderByHand, HasAnEmptySiteOnceAcrossTheSides) {
-  for (const double shift : {0.0, 0.4, 0.9}) {
-    Snapshot at;
-    DiskProperties disks;
-    const double width = 8 * 1.02, height = 8 * 1.02 * std::numbers::sqrt3 / 2;
-    for (int k = 1; k < 64; ++k) {
-      const double x = (k % 8 + 0.5 * (k / 8 % 2)) * 1.02 - shift, z = (k / 8) * 1.02 * std::numbers::sqrt3 / 2 - shift;
-      at.x.push_back(x - width * std::floor(x / width)), at.z.push_back(z - height * std::floor(z / height));
-      disks.radius.push_back(0.5), disks.mass.push_back(1);
+  for (const double diameter : {1.0, 0.8, 1.5})
+    for (const double shift : {0.0, 0.4, 0.9}) {
+      Snapshot at;
+      DiskProperties disks;
+      const double apart = 1.02 * diameter, row = apart * std::numbers::sqrt3 / 2, width = 8 * apart, height = 8 * row;
+      for (int k = 1; k < 64; ++k) {
+        const double x = (k % 8 + 0.5 * (k / 8 % 2)) * apart - shift, z = (k / 8) * row - shift;
+        at.x.push_back(x - width * std::floor(x / width)), at.z.push_back(z - height * std::floor(z / height));
+        disks.radius.push_back(0.5 * diameter), disks.mass.push_back(1);
+      }
+      const BondOrder order = bond_order(at, disks, width, height);
+      ASSERT_EQ(order.vacancy_x.size(), 1U) << diameter << " " << shift;
+      EXPECT_NEAR(std::remainder(order.vacancy_x[0] + shift, width), 0, 1e-9);
+      EXPECT_NEAR(std::remainder(order.vacancy_z[0] + shift, height), 0, 1e-9);
     }
-    const BondOrder order = bond_order(at, disks, width, height);
-    ASSERT_EQ(order.vacancy_x.size(), 1U) << shift;
-    EXPECT_NEAR(std::remainder(order.vacancy_x[0] + shift, width), 0, 1e-9);
-    EXPECT_NEAR(std::remainder(order.vacancy_z[0] + shift, height), 0, 1e-9);
-  }
 }
 
 }  // namespace

@@ -153,6 +153,28 @@ TEST(PressedBed, CarriesAColumnAtRestContactByContact) {
   for (std::uint32_t i = 0; i + 1 < count; ++i) EXPECT_NEAR(forces[i], i + 1, 1e-9);
 }
 
+// Two disks that meet with dashpots: energy that is neither motion nor compression is damped, at every step of a contact
+// and not only at its end.
+TEST(PressedBed, HasDampedAtEveryStepWhatIsLost) {
+  PressedBed bed = soft_disks(0.6);
+  constexpr double lasts = 1e-3, speed = 0.4, step = lasts / 40;
+  bed.begin({{3, 10, speed, 0}, {4.00005, 10, -speed, 0}}, still, lasts);
+  const auto energy = [&] {
+    double sum = bed.compressed() + bed.damped();
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      const PressedBed::State at = bed.at(i, 0);
+      sum += at.z + 0.5 * (at.vx * at.vx + at.vz * at.vz);
+    }
+    return sum;
+  };
+  const double before = energy();
+  for (int k = 0; k < 60; ++k) {
+    bed.step(still, still, step);
+    EXPECT_NEAR(energy(), before, 0.01 * speed * speed) << k;
+  }
+  EXPECT_GT(bed.damped(), 0.5 * (1 - 0.36) * speed * speed);
+}
+
 // What disks fall by is in the springs, in the dashpots or still motion: to the order of the steps.
 TEST(PressedBed, ClosesItsEnergyByItsStepsAlone) {
   double last = 0;
@@ -429,6 +451,21 @@ TEST(PressedBed, MayBeTheStartOfAnotherBed) {
   scene.start = start;
   const auto next = simulate(scene);
   EXPECT_LT(next->largest_overlap(), 1e-12);
+  // Out of floor and lid by what they overlap, and no farther; not where they overlap by more than is allowed.
+  Scene box = pressed_scene(1.6);
+  box.box.floor = {};
+  box.disks.species[0].count = 2;
+  box.box.top = Lid{8, {}};
+  const auto placed = [&](double deep) {
+    box.start = PlacedStart{{{3, 0.5 - deep, 0, 0, 0, 0}, {6, 7.5 + deep, 0, 0, 0, 0}}};
+    Snapshot moved;
+    simulate(box)->snapshot(moved);
+    return moved.z;
+  };
+  const std::vector<double> apart = placed(0.6 * soft_overlap);
+  EXPECT_NEAR(apart[0], 0.5, 1e-12);
+  EXPECT_NEAR(apart[1], 7.5, 1e-12);
+  EXPECT_THROW(placed(1.1 * soft_overlap), std::runtime_error);
   start.disks[0].x = start.disks[1].x;
   start.disks[0].z = start.disks[1].z + 0.9;
   scene.start = start;
