@@ -517,12 +517,12 @@ TEST_F(FitWarnings, NameAPlateauThatIsNotDetermined) {
   result_.plateau_density = {1.1, 0.01, false}, result_.solid_height = {0, 0, false};
   EXPECT_THAT(said(), ElementsAre(HasSubstr("no solid: ")));
   result_.solid_height = {4, 0.01, false}, result_.misfit = true;
-  result_.chi2_per_dof = 4, result_.p_value = 1e-5;
-  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1e-05."));
+  result_.chi2_per_dof = 4, result_.p_value = 1.23e-5;
+  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05."));
   result_.errors_scaled = true;
-  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1e-05. The errors were multiplied by 2."));
+  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05. The errors were multiplied by 2."));
   result_.model_error = 0.03;
-  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1e-05. A systematic error of 0.03 was "
+  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05. A systematic error of 0.03 was "
                                   "added to every density."));
 }
 

@@ -53,6 +53,7 @@ TEST_F(Pipeline, WritesTheFixedResultFiles) {
        {"shakebed", "git", "compiler", "host", "command_line", "started", "finished", "exit_code", "stages", "outputs"})
     EXPECT_TRUE(manifest.contains(key)) << key;
   EXPECT_EQ(manifest["stages"][0]["seed"], 7);
+  EXPECT_GT(manifest["stages"][0]["cost"]["wall_seconds"].get<double>(), 0);
   EXPECT_EQ(manifest["stages"][0]["outputs"][0]["sha256"].get<std::string>().size(), 64u);
   const Json summary = read_json(folder_ / "o" / "summary.json");
   EXPECT_TRUE(summary["bed"]["temperature_x_over_mg"].contains("value"));

@@ -287,6 +287,9 @@ TEST_F(SweepsByHand, RunEveryPointOnce) {
   EXPECT_EQ(read_text(folder_ / "o/sweep.csv"),
             "point,replica,status,map_gamma,map_gamma_result,map_gamma_result_std_error\n"
             "000000,0,ok,2,2,\n000001,1,ok,2,2,\n000002,0,ok,3,3,\n000003,1,ok,3,3,\n");
+  const Json columns = read_json(folder_ / "o/sweep.csv-metadata.json");
+  EXPECT_EQ(columns["url"], "sweep.csv");
+  EXPECT_EQ(columns["tableSchema"]["columns"].size(), 6U);
   EXPECT_EQ(arguments_.result["points"], 4);
   EXPECT_EQ(arguments_.result["done"], 4);
   EXPECT_EQ(arguments_.result["missing"], 0);
