@@ -58,10 +58,10 @@ constexpr double largest_proposed = 0.25;
 // px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
 // drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
 constexpr double wide_enough_px = 24;
-// Narrower circles are believed where so many are seen nearly whole, and no harmonic of their outlines exceeds this,
-// radii: of drawn disks of 5 to 10 px up to 0.005, with much noise 0.009; of hexagons of 8.5 px 0.020, and of other
-// shapes 0.022 to 0.09.
-constexpr std::ptrdiff_t fewest_whole = 20;
+// Circles that are not wide are believed where at least so many are seen nearly whole, and no harmonic of their
+// outlines exceeds this, radii: of drawn disks of 5 to 10 px up to 0.005, with much noise 0.009; of hexagons of 8.5 px
+// 0.020, and of other shapes 0.022 to 0.09.
+constexpr std::ptrdiff_t fewest_whole = 3;
 constexpr double nearly_whole = 0.9, clearly_round = 0.01;
 // Small hexagons are as round as that, but the sixth harmonic of their outlines stands out: it is 0.0056 radii or more
 // for 5.5 to 7.5 px, and 2.2 to 4.2 times the fifth. Noise makes both alike: at most 1.8 times in drawn disks.
@@ -458,14 +458,14 @@ bool is_clearly_round(const Roundness& roundness) {
          harmonic[6] <= std::max(six_corners, sixth_stands_out * harmonic[5]);
 }
 
-// Whether the circles of a hypothesis are many that are seen whole, and clearly rounder than small hexagons. Stretched
-// copies of such disks pass as parts of circles, and say nothing against them.
+// Of a hypothesis whose circles are seen whole and are clearly rounder than small hexagons: what is seen of it.
+// Stretched copies of such disks pass as parts of circles, and say nothing against them.
 std::optional<SurveyCandidate> examined_as_closed(ExaminedPicture& of, const CircleHypothesis& hypothesis,
                                                   const SurveyAsked& asked) {
   const auto whole = std::count_if(hypothesis.seen.begin(), hypothesis.seen.end(),
                                    [](const Circle& circle) { return circle.support >= nearly_whole; });
   if (whole < fewest_whole) return std::nullopt;
-  Examined out = examined_as(of, hypothesis, asked, Known::fairly_wide);
+  Examined out = examined_as(of, hypothesis, asked, Known::wide);
   if (!out.candidate.why_not.empty() || !is_clearly_round(out.roundness)) return std::nullopt;
   return std::move(out.candidate);
 }
@@ -477,7 +477,7 @@ SurveyCandidate examined(ExaminedPicture& of, const CircleHypothesis& hypothesis
                         : width >= wide_enough_px ? Known::fairly_wide
                                                   : Known::nothing;
   SurveyCandidate candidate = examined_as(of, hypothesis, asked, given ? Known::radius : unasked).candidate;
-  if (given || unasked != Known::nothing || candidate.why_not.empty() || candidate.not_round) return candidate;
+  if (given || unasked == Known::wide || candidate.why_not.empty() || candidate.not_round) return candidate;
   return examined_as_closed(of, hypothesis, asked).value_or(std::move(candidate));
 }
 

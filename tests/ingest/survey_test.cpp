@@ -305,7 +305,7 @@ bool in_polygon(const Place& place, int corners, double radius, double x, double
   return std::hypot(right, down) * std::cos(from_middle) < radius * std::cos(part / 2);
 }
 
-// Small disks in a clean picture are seen whole, all of them: poorer circles, of which its stretched copies are full,
+// Disks in a clean picture are seen whole, all of them: poorer circles, of which its stretched copies are full,
 // say nothing against them. Small hexagons are not so round.
 TEST(Survey, SmallDisksInACleanPictureAreFound) {
   const auto lattice = [](double radius) {
@@ -324,6 +324,12 @@ TEST(Survey, SmallDisksInACleanPictureAreFound) {
     const Paint disks = [&](double x, double y) { return disk_at(x, y) == nullptr ? 200.0 : 60.0; };
     expect_all(seen(radius, disks), places, radius);
   }
+  const std::vector<Place> few = scattered(4, 45, 260, 220, 3);
+  const BeadAt one_of(few, 17);
+  expect_all(
+      survey_of({{Channel::grey,
+                  painted(260, 220, [&](double x, double y) { return one_of(x, y) == nullptr ? 200.0 : 60.0; })}}),
+      few, 17);
   const std::vector<Place> places = lattice(8);
   const BeadAt around(places, 8.8);
   const Paint hexagons = [&](double x, double y) {
