@@ -308,12 +308,23 @@ def run(
 def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> tuple[int, list[str]]:
     """Run the program; return its exit code and its error messages. Ctrl-C ends the program first."""
     import subprocess
+    import threading
 
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
-                               start_new_session=True)
+    # Ctrl-C while the program is being started waits until it can be ended.
+    before, interrupts = signal.getsignal(signal.SIGINT), []
+    waits = callable(before) and threading.current_thread() is threading.main_thread()
+    process = None
     errors = []
     try:
+        if waits:
+            signal.signal(signal.SIGINT, lambda number, frame: interrupts.append((number, frame)))
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                   errors="replace", start_new_session=True)
         assert process.stderr is not None
+        if waits:
+            signal.signal(signal.SIGINT, before)
+        for interrupt in interrupts:
+            before(*interrupt)
         for line in process.stderr:
             if line.startswith("error: "):
                 errors.append(line[len("error: "):].rstrip("\n"))
@@ -321,9 +332,12 @@ def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> 
                 progress(int(match.group(2)) / 100)
         return process.wait(), errors
     except BaseException:
-        process.send_signal(signal.SIGINT)
-        process.wait()
+        if process is not None:
+            process.send_signal(signal.SIGINT)
+            process.wait()
         raise
     finally:
-        if process.stderr is not None:
+        if waits:
+            signal.signal(signal.SIGINT, before)
+        if process is not None and process.stderr is not None:
             process.stderr.close()

@@ -95,6 +95,25 @@ def test_control_c_ends_the_program_too(recipe, tmp_path):
     shakebed.run(recipe, tmp_path / "out")  # nobody holds the folder's lock
 
 
+def test_control_c_while_the_program_starts_ends_it(recipe, tmp_path, monkeypatch):
+    start, started = subprocess.Popen, []
+
+    def interrupted(*arguments, **options):
+        started.append(start(*arguments, **options))
+        os.kill(os.getpid(), signal.SIGINT)
+        return started[0]
+
+    monkeypatch.setattr(subprocess, "Popen", interrupted)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            shakebed.run(recipe, tmp_path / "out", set={"/stages/bed/measure": "100000 s"})
+        assert started[0].poll() is not None
+        assert signal.getsignal(signal.SIGINT) is before
+    finally:
+        started[0].kill()
+
+
 def test_the_module_is_the_command_line():
     done = subprocess.run([sys.executable, "-m", "shakebed", "--version"], capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.startswith(f"shakebed {shakebed.__version__}")
