@@ -27,6 +27,17 @@ Scene lone_disk(const Bath& bath, std::uint64_t seed) {
   scene.start = PlacedStart{{{3, 4, 0.5, -0.25, 0, 0}}};
   return scene;
 }
+// One of mass 1 from rest along the vertical, half a diameter above a thermal floor of T = 2.
+Scene fallen_on_a_thermal_floor() {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{1, 1, 1}};
+  scene.box.width = 20;
+  scene.bath = ThermalFloor{2};
+  scene.seed = 5;
+  scene.start = PlacedStart{{{10, 1, 0.5, 0, 0, 0}}};
+  return scene;
+}
 struct Velocity {
   double x, z;
 };
@@ -99,14 +110,7 @@ TEST(Baths, OfAndersenDrawAnew) {
 
 // A disk of mass 1 that falls on the floor leaves it with the velocity of the flux of a gas at T.
 TEST(Baths, OnAThermalFloorThrow) {
-  Scene scene;
-  scene.gravity = UniformGravity{};
-  scene.disks.species = {{1, 1, 1}};
-  scene.box.width = 20;
-  scene.bath = ThermalFloor{2};
-  scene.seed = 5;
-  scene.start = PlacedStart{{{10, 1, 0.5, 0, 0, 0}}};
-  const auto simulation = simulate(scene);
+  const auto simulation = simulate(fallen_on_a_thermal_floor());
   Random random(5 ^ bath_stream);
   const double x = std::sqrt(2) * random.normal_pair().first,
                z = std::sqrt(2) * std::sqrt(-2 * std::log(random.uniform_positive()));
@@ -121,14 +125,7 @@ TEST(Baths, OnAThermalFloorThrow) {
 
 // The temperature from now on, whichever the reservoir; a scene without one has none to set.
 TEST(Baths, TakeAnotherTemperature) {
-  Scene scene;
-  scene.gravity = UniformGravity{};
-  scene.disks.species = {{1, 1, 1}};
-  scene.box.width = 20;
-  scene.bath = ThermalFloor{2};
-  scene.seed = 5;
-  scene.start = PlacedStart{{{10, 1, 0.5, 0, 0, 0}}};
-  const auto thermal = simulate(scene);
+  const auto thermal = simulate(fallen_on_a_thermal_floor());
   thermal->set_bath_temperature(8);
   Random random(5 ^ bath_stream);
   const double x = std::sqrt(8) * random.normal_pair().first;
