@@ -520,7 +520,8 @@ TEST_F(FitWarnings, NameAPlateauThatIsNotDetermined) {
   result_.chi2_per_dof = 4, result_.p_value = 1.23e-5;
   EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05."));
   result_.errors_scaled = true;
-  EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05. The errors were multiplied by 2."));
+  EXPECT_THAT(said(),
+              ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05. The errors were multiplied by 2."));
   result_.model_error = 0.03;
   EXPECT_THAT(said(), ElementsAre("The model does not fit: chi2/dof = 4, p = 1.2e-05. A systematic error of 0.03 was "
                                   "added to every density."));

@@ -84,21 +84,22 @@ TEST(MeasuredBed, SaysWhatCannotBeMeasuredWithItsNumbers) {
   shaken.box.floor = SinusoidalFloor{.amplitude = 1, .frequency = 0.5};
   const auto said = [](const Scene& scene, const MeasureOptions& options) { return options.validate(scene); };
   using Words = std::vector<std::string>;
-  EXPECT_EQ(said(still, {.settle = -1.5, .duration = 0, .phases = 0, .spacing = -0.25, .kernel = {}}),
-            (Words{"settle is -1.5; it must be 0 or more", "duration is 0; it must be above 0",
-                   "phases is 0; the bed must be sampled at least once per period",
-                   "spacing is -0.25; it must be above 0",
-                   "the density is measured through a kernel: give a kernel other than none, with a finite width above "
-                   "0"}));
+  EXPECT_EQ(
+      said(still, {.settle = -1.5, .duration = 0, .phases = 0, .spacing = -0.25, .kernel = {}}),
+      (Words{"settle is -1.5; it must be 0 or more", "duration is 0; it must be above 0",
+             "phases is 0; the bed must be sampled at least once per period", "spacing is -0.25; it must be above 0",
+             "the density is measured through a kernel: give a kernel other than none, with a finite width above "
+             "0"}));
   EXPECT_EQ(said(shaken, {.duration = 1e13}),
             Words{"duration is 5e+12 periods of the floor; at most 1e+12 periods can be measured"});
   EXPECT_EQ(said(shaken, {.duration = 6, .phases = 4, .frames = 13}),
             Words{"13 frames are to be stored, but the bed is sampled only 12 times; measure longer or store fewer "
                   "frames"})
       << "three periods of four samples";
-  EXPECT_EQ(said(still, {.duration = 6, .phases = 4, .frame_phases = {0.25}}),
-            Words{"frames are wanted at phases at which the bed is not sampled; give different multiples of 1/4, from 0 "
-                  "to below 1, and a floor that shakes"});
+  EXPECT_EQ(
+      said(still, {.duration = 6, .phases = 4, .frame_phases = {0.25}}),
+      Words{"frames are wanted at phases at which the bed is not sampled; give different multiples of 1/4, from 0 "
+            "to below 1, and a floor that shakes"});
   EXPECT_EQ(to_string(MeasureStatus::ok), "ok");
   EXPECT_EQ(to_string(MeasureStatus::stopped), "stopped");
   EXPECT_EQ(to_string(MeasureStatus::bad_input), "bad input");

@@ -153,8 +153,8 @@ TEST(PressedBed, CarriesAColumnAtRestContactByContact) {
   for (std::uint32_t i = 0; i + 1 < count; ++i) EXPECT_NEAR(forces[i], i + 1, 1e-9);
 }
 
-// Two disks that meet with dashpots: energy that is neither motion nor compression is damped, at every step of a contact
-// and not only at its end.
+// Two disks that meet with dashpots: energy that is neither motion nor compression is damped, at every step of a
+// contact and not only at its end.
 TEST(PressedBed, HasDampedAtEveryStepWhatIsLost) {
   PressedBed bed = soft_disks(0.6);
   constexpr double lasts = 1e-3, speed = 0.4, step = lasts / 40;

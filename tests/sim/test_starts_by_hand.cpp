@@ -415,8 +415,8 @@ TEST(StartByHand, FillsNoMoreThanOneAfterTheOtherCan) {
   scene.disks.species[0].count = 230;
   EXPECT_EQ(place_disks(scene).size(), 230U) << "0.45 of the area";
   scene.disks.species[0].count = 331;
-  EXPECT_THAT([&] { place_disks(scene); },
-              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("no place for a disk after 20,000 attempts")));
+  EXPECT_THAT([&] { place_disks(scene); }, testing::ThrowsMessage<std::runtime_error>(
+                                               testing::HasSubstr("no place for a disk after 20,000 attempts")));
 }
 
 // Every limit of a place, one disk of 2 D: 1e-12 of the width and 1e-12 D are rounding.
