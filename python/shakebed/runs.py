@@ -311,20 +311,21 @@ def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> 
     import threading
 
     # Ctrl-C while the program is being started waits until it can be ended.
-    before, interrupts = signal.getsignal(signal.SIGINT), []
-    waits = callable(before) and threading.current_thread() is threading.main_thread()
+    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    before = handler if callable(handler) else None
+    interrupts: list[tuple[int, Any]] = []
     process = None
-    errors = []
+    errors: list[str] = []
     try:
-        if waits:
+        if before is not None:
             signal.signal(signal.SIGINT, lambda number, frame: interrupts.append((number, frame)))
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                    errors="replace", start_new_session=True)
         assert process.stderr is not None
-        if waits:
+        if before is not None:
             signal.signal(signal.SIGINT, before)
-        for interrupt in interrupts:
-            before(*interrupt)
+            for interrupt in interrupts:
+                before(*interrupt)
         for line in process.stderr:
             if line.startswith("error: "):
                 errors.append(line[len("error: "):].rstrip("\n"))
@@ -337,7 +338,7 @@ def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> 
             process.wait()
         raise
     finally:
-        if waits:
+        if before is not None:
             signal.signal(signal.SIGINT, before)
         if process is not None and process.stderr is not None:
             process.stderr.close()
