@@ -89,12 +89,7 @@ const StatedResult* Fields::check_result(std::string_view pointer_below, const s
     problem(pointer_below, misfit->what, misfit->suggestion);
     return nullptr;
   }
-  const std::string id = split_pointer(pointer).front();
-  for (const StatedStage& stage : source_.from) {
-    if (stage.id == id && stage.results != nullptr)
-      return stage.results->find(std::string_view(pointer).substr(1 + escape_pointer_token(id).size()));
-  }
-  return nullptr;
+  return find_result(source_.from, pointer);
 }
 
 void Fields::either(std::string_view one, std::string_view other, const std::string& suggestion) {

@@ -259,6 +259,20 @@ double parse_quantity(std::string_view text, const Dimension& wanted) {
   return quantity.value;
 }
 
+double in_unit_of_result(const Quantity& quantity, const std::string& unit, std::string_view called) {
+  if (!quantity.has_unit) return quantity.value;
+  Quantity one;
+  try {
+    one = parse_quantity("1 " + unit);
+  } catch (const std::invalid_argument&) {
+    throw std::invalid_argument(fmt::format("the result is in \"{}\", so {} must be a plain number", unit, called));
+  }
+  if (one.dimension != quantity.dimension)
+    throw std::invalid_argument(
+        fmt::format("the result is in \"{}\", but {} is {}", unit, called, name_of(quantity.dimension)));
+  return quantity.value / one.value;
+}
+
 std::string quantity_text(double value, const Dimension& dimension) {
   const std::string unit = si_unit(dimension);
   return unit.empty() ? number_text(value) : number_text(value) + " " + unit;

@@ -54,6 +54,11 @@ Quantity parse_quantity(std::string_view text, const Dimension* wanted = nullptr
 // Reads a quantity of the dimension wanted; a plain number counts as SI. Throws std::invalid_argument.
 double parse_quantity(std::string_view text, const Dimension& wanted);
 
+// What is compared with a result, in the result's unit; a plain number counts as being in it. Throws
+// std::invalid_argument where their kinds differ, or the unit is one that only results have ("m g D"). `called`: "the
+// expected value".
+double in_unit_of_result(const Quantity& quantity, const std::string& unit, std::string_view called);
+
 // "0.00299 m": the value in the SI unit, with as many digits as give the same double back.
 std::string quantity_text(double value, const Dimension& dimension);
 // For people: "2.99 mm", "50 ms": six digits and a handy prefix.

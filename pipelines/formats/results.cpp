@@ -120,6 +120,15 @@ std::vector<std::string> below(const ResultList& results, const std::vector<std:
 
 }  // namespace
 
+const StatedResult* find_result(const std::vector<StatedStage>& stages, const std::string& pointer) {
+  const std::string id = split_pointer(pointer).front();
+  for (const StatedStage& stage : stages) {
+    if (stage.id == id && stage.results != nullptr)
+      return stage.results->find(std::string_view(pointer).substr(1 + escape_pointer_token(id).size()));
+  }
+  return nullptr;
+}
+
 std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, const std::string& pointer,
                                         std::string_view called) {
   std::vector<std::string> tokens;

@@ -90,12 +90,15 @@ class ResultList {
   std::vector<StatedTable> tables_;
 };
 
+// What a pointer such as "/fit/temperature" leads to among the results of these stages; nullptr if none states it.
+const StatedResult* find_result(const std::vector<StatedStage>& stages, const std::string& pointer);
+
 // What is wrong with a name, and what to do.
 struct Misfit {
   std::string what, suggestion;
 };
-// Whether a pointer such as "/fit/temperature" leads to something that one of these stages gives; `called` says which
-// stages these are: "the recipe", "\"from\"".
+// Whether such a pointer leads to something that one of these stages gives; `called` says which stages these are: "the
+// recipe", "\"from\"".
 std::optional<Misfit> misfit_of_pointer(const std::vector<StatedStage>& stages, const std::string& pointer,
                                         std::string_view called);
 // Whether a stage writes a table of this name.

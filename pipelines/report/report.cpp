@@ -132,11 +132,7 @@ class Report {
       const std::string own = unit;
       unit = start == std::string::npos ? "" : number.value.substr(start);
       printed = wanted.value / parse_quantity("1 " + unit).value;
-      try {
-        factor = parse_quantity("1 " + own).value / parse_quantity("1 " + unit).value;
-      } catch (const std::invalid_argument&) {
-        factor = 1;
-      }
+      factor = parse_quantity("1 " + own).value / parse_quantity("1 " + unit).value;
     }
     const double ours = (*found)["value"].get<double>() * factor, error = stated_error(*found) * factor;
     row.ours = error > 0 ? fmt::format("{:.4g} ± {:.2g}", ours, error) : fmt::format("{:.4g}", ours);

@@ -362,9 +362,12 @@ class PlanBuilder {
   void check_pointers() {
     if (order_.size() < drafts_.size() || drafts_.empty()) return;  // the stages are not known
     const std::vector<StatedStage> stated = plan_.stated();
-    const auto check = [&](const std::string& where, const std::string& pointer) {
+    // Where it leads; nullptr if it leads to nothing, which is then said.
+    const auto check = [&](const std::string& where, const std::string& pointer) -> const StatedResult* {
       const auto misfit = misfit_of_pointer(stated, pointer, "the recipe");
-      if (misfit) problem(*find_pointer(plan_.document, where), where, misfit->what, misfit->suggestion);
+      if (!misfit) return find_result(stated, pointer);
+      problem(*find_pointer(plan_.document, where), where, misfit->what, misfit->suggestion);
+      return nullptr;
     };
     if (plan_.sweep) {
       // One string stands for an array of one.
@@ -375,40 +378,27 @@ class PlanBuilder {
     const std::vector<PublishedNumber>& published = plan_.report.published;
     for (std::size_t i = 0; i < published.size(); ++i) {
       if (published[i].pointer.empty()) continue;
-      check(pointer_join("/report/published", i) + "/number", published[i].pointer);
-      check_published_unit(stated, i);
+      const std::string where = pointer_join("/report/published", i);
+      if (const StatedResult* ours = check(where + "/number", published[i].pointer))
+        check_published_unit(where + "/value", published[i].value, *ours);
     }
     for (std::size_t i = 0; i < plan_.report.assumed.size(); ++i) check_assumed(i);
   }
 
   // Ours is shown in the unit of the published value, so it must have one of the same kind.
-  void check_published_unit(const std::vector<StatedStage>& stated, std::size_t i) {
-    const PublishedNumber& number = plan_.report.published[i];
-    const StatedResult* ours = nullptr;
-    for (const StatedStage& stage : stated) {
-      const std::string below = pointer_join("", stage.id);
-      if (stage.results != nullptr && number.pointer.starts_with(below + "/"))
-        ours = stage.results->find(number.pointer.substr(below.size()));
-    }
-    if (ours == nullptr || (ours->kind != ResultKind::quantity && ours->kind != ResultKind::number)) return;
-    const std::string where = pointer_join("/report/published", i) + "/value";
-    Quantity printed, unit;
+  void check_published_unit(const std::string& where, const std::string& value, const StatedResult& ours) {
+    if (ours.kind != ResultKind::quantity && ours.kind != ResultKind::number) return;
+    Quantity published;
     try {
-      printed = parse_quantity(number.value);
+      published = parse_quantity(value);
     } catch (const std::invalid_argument&) {
       return;  // this has been said
     }
-    if (!printed.has_unit) return;
     try {
-      unit = parse_quantity("1 " + ours->unit);
-    } catch (const std::invalid_argument&) {
-      return problem(*find_pointer(plan_.document, where), where,
-                     fmt::format("the result is in \"{}\", so the published value must be a plain number", ours->unit));
+      in_unit_of_result(published, ours.unit, "the published value");
+    } catch (const std::invalid_argument& misfit) {
+      problem(*find_pointer(plan_.document, where), where, misfit.what());
     }
-    if (unit.dimension != printed.dimension)
-      problem(*find_pointer(plan_.document, where), where,
-              fmt::format("the result is in \"{}\", but the published value is {}", ours->unit,
-                          name_of(printed.dimension)));
   }
 
   // An input that had to be assumed is one that the recipe states, or leaves at its default.

@@ -109,19 +109,7 @@ Found unpack(const Json& json) {
 // An expected quantity in the unit of the result. Throws std::invalid_argument.
 double in_unit_of(const Json& expected, const Found& found, const std::string& what) {
   if (expected.is_number()) return expected.get<double>();
-  const Quantity quantity = parse_quantity(expected.get<std::string>());
-  if (!quantity.has_unit) return quantity.value;
-  Quantity unit;
-  try {
-    unit = parse_quantity("1 " + found.unit);
-  } catch (const std::invalid_argument&) {
-    throw std::invalid_argument(fmt::format("the result is in \"{}\", so {} must be a plain number", found.unit, what));
-  }
-  if (unit.dimension != quantity.dimension) {
-    throw std::invalid_argument(
-        fmt::format("the result is in \"{}\", but {} is {}", found.unit, what, name_of(quantity.dimension)));
-  }
-  return quantity.value / unit.value;
+  return in_unit_of_result(parse_quantity(expected.get<std::string>()), found.unit, what);
 }
 
 std::string text_of(const Json& json) { return json.is_string() ? json.get<std::string>() : dump_canonical(json); }
