@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
 import re
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, KeysView, Mapping, Optional, Union
+from typing import TYPE_CHECKING, Any, Callable, Iterator, KeysView, Mapping, Optional, Union
 
 import numpy as np
 
@@ -305,27 +306,36 @@ def run(
     raise error
 
 
+@contextlib.contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Ctrl-C acts when the block is left."""
+    import threading
+
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    interrupts: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: interrupts.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        for interrupt in interrupts:
+            handler(*interrupt)
+
+
 def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> tuple[int, list[str]]:
     """Run the program; return its exit code and its error messages. Ctrl-C ends the program first."""
     import subprocess
-    import threading
 
-    # Ctrl-C while the program is being started waits until it can be ended.
-    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
-    before = handler if callable(handler) else None
-    interrupts: list[tuple[int, Any]] = []
     process = None
     errors: list[str] = []
     try:
-        if before is not None:
-            signal.signal(signal.SIGINT, lambda number, frame: interrupts.append((number, frame)))
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                                   errors="replace", start_new_session=True)
+        with _interrupts_wait():  # until there is a program that can be ended
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                       errors="replace", start_new_session=True)
         assert process.stderr is not None
-        if before is not None:
-            signal.signal(signal.SIGINT, before)
-            for interrupt in interrupts:
-                before(*interrupt)
         for line in process.stderr:
             if line.startswith("error: "):
                 errors.append(line[len("error: "):].rstrip("\n"))
@@ -338,7 +348,5 @@ def _follow(command: list[str], progress: Optional[Callable[[float], None]]) -> 
             process.wait()
         raise
     finally:
-        if before is not None:
-            signal.signal(signal.SIGINT, before)
         if process is not None and process.stderr is not None:
             process.stderr.close()
