@@ -435,6 +435,24 @@ TEST(PressedBed, LeavesWellShakenBedsAlone) {
 }
 
 // The last frame of a bed may be the start of another one.
+// Out of floor and lid by what they overlap, and no farther; not where they overlap by more than is allowed.
+TEST(PressedBed, StartsOutOfFloorAndLid) {
+  Scene scene = pressed_scene(1.6);
+  scene.box.floor = StillFloor{};
+  scene.disks.species[0].count = 2;
+  scene.box.top = Lid{8, {}};
+  const auto placed = [&](double deep) {
+    scene.start = PlacedStart{{{3, 0.5 - deep, 0, 0, 0, 0}, {6, 7.5 + deep, 0, 0, 0, 0}}};
+    Snapshot moved;
+    simulate(scene)->snapshot(moved);
+    return moved.z;
+  };
+  const std::vector<double> apart = placed(0.6 * soft_overlap);
+  EXPECT_NEAR(apart[0], 0.5, 1e-12);
+  EXPECT_NEAR(apart[1], 7.5, 1e-12);
+  EXPECT_THROW(placed(1.1 * soft_overlap), std::runtime_error);
+}
+
 TEST(PressedBed, MayBeTheStartOfAnotherBed) {
   Scene scene = pressed_scene(1.6);
   const auto bed = simulate(scene);
@@ -451,21 +469,6 @@ TEST(PressedBed, MayBeTheStartOfAnotherBed) {
   scene.start = start;
   const auto next = simulate(scene);
   EXPECT_LT(next->largest_overlap(), 1e-12);
-  // Out of floor and lid by what they overlap, and no farther; not where they overlap by more than is allowed.
-  Scene box = pressed_scene(1.6);
-  box.box.floor = {};
-  box.disks.species[0].count = 2;
-  box.box.top = Lid{8, {}};
-  const auto placed = [&](double deep) {
-    box.start = PlacedStart{{{3, 0.5 - deep, 0, 0, 0, 0}, {6, 7.5 + deep, 0, 0, 0, 0}}};
-    Snapshot moved;
-    simulate(box)->snapshot(moved);
-    return moved.z;
-  };
-  const std::vector<double> apart = placed(0.6 * soft_overlap);
-  EXPECT_NEAR(apart[0], 0.5, 1e-12);
-  EXPECT_NEAR(apart[1], 7.5, 1e-12);
-  EXPECT_THROW(placed(1.1 * soft_overlap), std::runtime_error);
   start.disks[0].x = start.disks[1].x;
   start.disks[0].z = start.disks[1].z + 0.9;
   scene.start = start;
