@@ -161,9 +161,9 @@ class FilmLearner {
 
   [[noreturn]] static void refuse(std::size_t read, const std::string& reason, const std::string& error) {
     if (read == 0)
-      throw InputError("(frames)", "no frame could be read", error.empty() ? "the stream is empty" : error,
+      throw InputError("the frames", "none could be read", error.empty() ? "the stream is empty" : error,
                        "check the files");
-    throw NoDisksError("(frames)", "no disks in any of the first " + std::to_string(read) + " frames", reason,
+    throw NoDisksError("the frames", "no disks in any of the first " + std::to_string(read) + " frames", reason,
                        "check that sharp beads, at least 10 px wide, are visible");
   }
 

@@ -424,7 +424,7 @@ TEST(FilmCalibrated, SaysWhyNoFrameShowsABead) {
   };
   const std::string blank = why({test::even_frame(60, 50, 100), test::even_frame(60, 50, 100)});
   EXPECT_TRUE(test::holds(blank, "no disks in any of the first 2 frames")) << blank;
-  EXPECT_TRUE(test::holds(why({}), "no frame could be read")) << why({});
+  EXPECT_TRUE(test::holds(why({}), "none could be read")) << why({});
 }
 
 // --- learn_beads.hpp -------------------------------------------------------------------------------------------------
@@ -542,8 +542,6 @@ TEST(FacesWithoutARim, AreBeadsAmongBeads) {
 
 // --- missed_beads.hpp ------------------------------------------------------------------------------------------------
 
-// A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii of the beads. Here four
-// beads leave room for no more than the one between them.
 TEST(MissedBeads, AreAShareOfAllBeads) {
   EXPECT_DOUBLE_EQ(share_of_missed(3, 7), 0.3);
   EXPECT_DOUBLE_EQ(share_of_missed(1.1, 0), 1);
@@ -551,6 +549,8 @@ TEST(MissedBeads, AreAShareOfAllBeads) {
   EXPECT_EQ(share_of_missed(0, 0), 0);
 }
 
+// A place counts by the area of the largest of three sizes that fits: 1, 0.8 and 0.6 radii of the beads. Here four
+// beads leave room for no more than the one between them.
 TEST(MissedBeads, CountByTheirArea) {
   const auto missed = [](double radius) {
     std::vector<RenderedDisk> truth = strewn_disks(4, 4, 26, 9);

@@ -201,7 +201,7 @@ TEST_F(ImageCommands, SayWhyTheirPilotFailed) {
     write_text(folder_ / arguments.back(), "no picture");
   }
   EXPECT_THAT(refused(arguments, 5), testing::StartsWith("the pilot run of --budget, with 5 of 17 frames, failed: "
-                                                         "extract (extract): (frames): no frame could be read (" +
+                                                         "extract (extract): the frames: none could be read (" +
                                                          (folder_ / "p10.png").string() + ": "));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "o/extract"));
 }
