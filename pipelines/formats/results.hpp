@@ -90,7 +90,8 @@ class ResultList {
   std::vector<StatedTable> tables_;
 };
 
-// What a pointer such as "/fit/temperature" leads to among the results of these stages; nullptr if none states it.
+// What a well-formed pointer such as "/fit/temperature" leads to among the results of these stages; nullptr if none
+// states it.
 const StatedResult* find_result(const std::vector<StatedStage>& stages, const std::string& pointer);
 
 // What is wrong with a name, and what to do.
