@@ -139,6 +139,11 @@ class BedMeasurer {
         result_.warnings.push_back(shaking_.warnings()[k]);
     }
     bins_.count = std::min(bins_.count, bins_up_to(options_.highest.value_or(highest_ + 1)));
+    if (bins_.count == 0)
+      throw std::invalid_argument(
+          formatted("measure_bed: the lowest height of the profile, %g D, lies above all beads, "
+                    "whose highest is at %.1f D: give a lower one",
+                    bins_.lowest, highest_));
     if (cut_above_ > 0) end_below_upper_border();
     average_densities();
     if (coverage_) compare_coverage();

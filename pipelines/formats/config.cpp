@@ -213,7 +213,11 @@ bool Fields::read_integer(const JsonNode& node, std::string_view key, const Abou
   const bool too_low = node.number < 0 && value < low;
   const bool too_high = node.number > 0 && large > high;
   if (too_low || too_high) {
-    complain(node, key, fmt::format("must lie from {} to {}, got {}", low, high, node.text));
+    complain(node, key,
+             fmt::format("must lie from {} to {}, got {}",
+                         about.range.low > static_cast<double>(low) ? fmt::format("{:g}", about.range.low)
+                                                                    : fmt::to_string(low),
+                         high, node.text));
     return false;
   }
   return true;

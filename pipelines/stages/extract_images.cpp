@@ -162,7 +162,13 @@ class Extraction {
     if (rendered_ != nullptr && rendered_->has("truth.csv")) truth_file.emplace(rendered_->file("truth.csv"));
     DisksOnTheWay on_the_way(context_, options_, truth_file ? &*truth_file : nullptr);
     const ingest::Measurement found = measure(on_the_way);
-    if (rendered_ == nullptr) judge(found);
+    if (rendered_ == nullptr) {
+      judge(found);
+    } else if (options_.bead_number) {
+      Judgement judgement;
+      judge_bead_number(*options_.bead_number, found.disk_count_mean, judgement);
+      for (const std::string& one : judgement.warnings) context_.warning(one);
+    }
     warn(found);
     write(found, on_the_way);
   }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/images_module.hpp"
 
@@ -40,6 +42,9 @@ class Render : public Stage {
                     {.help = "height of the view above the floor's mean position; default: up to the highest disk",
                      .range = positive});
     fields.integer("frames", o.frames, {.help = "largest number of frames that are drawn; 0: all"});
+    fields.require(std::abs(o.gradient_x) < 1 && std::abs(o.gradient_y) < 1,
+                   std::abs(o.gradient_x) < 1 ? "gradient_y" : "gradient_x",
+                   "with a change of 1 one side of the frame gets no light", "Give less than 1");
     fields.require(o.bead_level != o.background_level, "bead_level",
                    "beads cannot be seen, because \"bead_level\" equals \"background_level\"", "Choose another level");
     if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->keeps_frames)

@@ -181,12 +181,22 @@ class FrameDrawer {
                     .radius_px = frame.radius[i] * pixels_per_diameter_,
                     .velocity_x_px_per_s = frame.vx[i] * velocity_px_,
                     .velocity_y_px_per_s = -frame.vz[i] * velocity_px_};
+        require_short_streak(disks[i]);
         text += fmt::format("{},{},{:.6f},{:.6f},{:.6f}\n", index, i, disks[i].x_px, disks[i].y_px, disks[i].radius_px);
       }
       write(context_.output("frames") / fmt::format("{:06d}.png", index), renderer.render(disks, index));
       add_truth(index, std::move(text));
       context_.progress(static_cast<double>(++done_) / static_cast<double>(extent_.frames), "drawing");
     }
+  }
+
+  void require_short_streak(const ingest::RenderedDisk& disk) const {
+    const double streak = std::hypot(disk.velocity_x_px_per_s, disk.velocity_y_px_per_s) * options_.exposure;
+    if (streak > camera_.width + camera_.height)
+      throw StageError(
+          fmt::format("within the exposure time of {} a disk moves by {:.3g} px, farther than the frame of "
+                      "{} x {} px: check the unit of \"exposure\", or give a shorter one",
+                      handy_text(options_.exposure, dimension::time), streak, camera_.width, camera_.height));
   }
 
   void write(const std::filesystem::path& path, const ingest::GrayFrame& frame) const {

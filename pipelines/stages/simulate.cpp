@@ -344,13 +344,14 @@ void Simulate::warn_of_contact_duration(RunContext& context, const Json& results
   const auto text = [&](double time) {
     return reduced ? fmt::format("{:.2g}", time) : "\"" + handy_text(time, dimension::time) + "\"";
   };
-  context.warning(
-      fmt::format("the contact duration t_c = {} makes {:.2g} % of the contacts elastic, so T may be about {:.2g} % "
-                  "too high. This t_c is a numerical cut-off, not the time that a real contact lasts{}. "
-                  "\"contact_duration\": {} would reduce this to {:.2g} % or less, with more contacts",
-                  text(two_digits(now * unit)), 100 * results.at("elastic_share").at("value").get<double>(),
-                  100 * effect->get<double>(), contact_time_text(bed_), text(shorter_than(wanted * unit, now * unit)),
-                  100 * allowed_contact_effect));
+  context.warning(fmt::format(
+      "the contact duration t_c = {} makes {} of the contacts elastic, so T may be about {} too high{}. This t_c is a "
+      "numerical cut-off, not the time that a real contact lasts{}. "
+      "\"contact_duration\": {} would reduce this to {} or less, with more contacts",
+      text(two_digits(now * unit)), percent_text(results.at("elastic_share").at("value").get<double>()),
+      percent_text(effect->get<double>()),
+      effect->get<double>() > sim::ContactDurationEffect::known_up_to ? ", or much more" : "", contact_time_text(bed_),
+      text(shorter_than(wanted * unit, now * unit)), percent_text(allowed_contact_effect)));
 }
 
 // ------------------------------------------------------------------------------------------------ --budget

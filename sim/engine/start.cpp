@@ -52,8 +52,16 @@ Room room_of(const Scene& scene) {
 
 [[noreturn]] void no_room(const Room& room) {
   std::ostringstream out;
-  out << room.count << " disks of up to " << room.diameter << " D do not fit into a box " << room.width
-      << " D wide and " << room.height << " D high. Give fewer disks or a larger box";
+  out << room.count << " disks of up to " << room.diameter << " D do not fit into a box " << room.width << " D wide";
+  if (!std::isinf(room.height)) out << " and " << room.height << " D high";
+  out << ". Give fewer disks or a larger box";
+  throw std::runtime_error(out.str());
+}
+
+[[noreturn]] void row_overlaps(std::uint32_t a_row, double spacing, double diameter) {
+  std::ostringstream out;
+  out << a_row << " disks a row are " << spacing << " D apart, but their diameter is up to " << diameter
+      << " D. Give fewer disks a row and a spacing of at least " << diameter << ", or 0 for both: as many as fit";
   throw std::runtime_error(out.str());
 }
 
@@ -97,7 +105,7 @@ std::vector<Point> hexagonal(const Room& room, const HexagonalStart& start) {
     if (even * even < d * d - a * a / 4 || (rows > 2 && even < d / 2)) no_room(room);
     row_height = even;
   }
-  if (a_row > 1 && a < d) no_room(room);
+  if (a_row > 1 && a < d) row_overlaps(a_row, a, d);
   std::vector<Point> points;
   for (std::uint32_t k = 0; k < room.count; ++k) {
     const std::uint32_t row = k / a_row, place = k % a_row;

@@ -23,6 +23,8 @@ ContactDurationEffect contact_duration_effect(const Counters& before, const Coun
   if (contacts > 0)
     effect.elastic_share = static_cast<double>(after.elastic_contacts - before.elastic_contacts) / contacts;
   if (dissipated > 0) effect.withheld_share = (after.withheld - before.withheld) / dissipated;
+  // Every contact was elastic, and each withheld what an earlier one of its chain had withheld: the bed loses nothing.
+  if (dissipated <= 0 && effect.elastic_share == 1) effect.withheld_share = 1;
   effect.temperature = heating * effect.withheld_share;
   return effect;
 }

@@ -12,11 +12,12 @@
 namespace shakebed::sim {
 
 struct ContactDurationEffect {
+  static constexpr double known_up_to = 0.1;
   double elastic_share = 0;   // of the contacts
-  double withheld_share = 0;  // energy withheld over energy dissipated
+  double withheld_share = 0;  // energy withheld over energy dissipated; 1 where every contact was elastic
   // The approximate relative excess of T_x and T_z. Smooth disks: right within a factor of two up to 0.05. Rough,
-  // strongly dissipating beds: too large, because most of their contacts are those of the bed's landing. Above 0.1: a
-  // lower bound.
+  // strongly dissipating beds: too large, because most of their contacts are those of the bed's landing. Above
+  // `known_up_to`: a lower bound, and T may be several times as high.
   double temperature = 0;
 };
 

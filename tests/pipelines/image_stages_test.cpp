@@ -125,6 +125,21 @@ TEST(RenderedBed, EndsWhereItsViewIsTold) {
   EXPECT_EQ(geometry.floor, 65 - 0.5 - 10);
 }
 
+// At 0.2 m/s sqrt(2) a disk moves by 298 px, the sum of the frame's sides, in 0.2107 s.
+TEST(RenderedBed, HasNoStreaksLongerThanItsFrames) {
+  TrajectoryFrame frame;
+  frame.width = 6.3;
+  frame.x = {3.15}, frame.z = {4}, frame.vx = {1}, frame.vz = {1}, frame.spin = {0}, frame.radius = {0.5};
+  BedOfCamera bed(bed_of_camera(), {frame});
+  RenderOptions options = plain_camera();
+  options.exposure = 30;
+  EXPECT_THAT([&] { render_frames(options, bed.stage); },
+              ThrowsMessage<StageError>(HasSubstr("within the exposure time of 30 s a disk moves by 4.24e+04 px, "
+                                                  "farther than the frame of 150 x ")));
+  options.exposure = 0.1;
+  EXPECT_NO_THROW(render_frames(options, bed.stage));
+}
+
 // A disk that goes right and up at sqrt(g D) = 0.2 m/s moves by 12 px each way in 12 ms: a streak from lower left to
 // upper right, seen 7 px from its middle on that diagonal and not on the other.
 TEST(RenderedBed, HasStreaksOfMovingDisks) {
@@ -249,6 +264,27 @@ TEST(ExtractedFrames, TakeWhatIsGivenBeforeTheGeometry) {
   EXPECT_EQ(found["floor"]["value"], 128);
   EXPECT_EQ(found["left_wall"]["value"], 12.5);
   EXPECT_NEAR(found["width"]["value"].get<double>(), 124 * 2.02e-4 / 0.004, 1e-9);
+}
+
+TEST(ExtractedFrames, AreComparedWithTheNumberOfTheirBeads) {
+  RenderedFrames frames(bed_of_camera(), 1);
+  frames.options.bead_number = 25;
+  frames.extracted();
+  EXPECT_THAT(frames.stage.warnings, Not(Contains(HasSubstr("bead_number"))));
+  frames.options.bead_number = 26;
+  frames.extracted();
+  EXPECT_THAT(frames.stage.warnings, Contains(HasSubstr("On average 25.00 beads were found, but bead_number is 26")));
+  frames.options.bead_number = 40;
+  EXPECT_THAT([&] { frames.extracted(); },
+              ThrowsMessage<StageError>(HasSubstr("but bead_number is 40. Other objects")));
+}
+
+TEST(ExtractedFrames, HaveBeadsAtTheHeightsOfTheProfile) {
+  RenderedFrames frames(bed_of_camera(), 1);
+  frames.options.lowest = 6.5;  // the highest bead is at 5.4 D, and a profile ends 1 D above it
+  EXPECT_THAT(
+      [&] { frames.extracted(); },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("the lowest height of the profile, 6.5 D, lies above all beads")));
 }
 
 TEST(ExtractedFrames, KnowThatTheirSidesArePeriodic) {

@@ -378,6 +378,10 @@ TEST_F(StageMistakes, OfMapsAndPictures) {
   EXPECT_EQ(render(R"("background_level": 100, "bead_level": 100)", some),
             "/stages/1/bead_level: beads cannot be seen, because \"bead_level\" equals \"background_level\". Choose "
             "another level");
+  EXPECT_EQ(render(R"("gradient_x": 0.99, "gradient_y": -0.99)", some), "");
+  EXPECT_EQ(render(R"("gradient_x": -1)", some),
+            "/stages/1/gradient_x: with a change of 1 one side of the frame gets no light. Give less than 1");
+  EXPECT_THAT(render(R"("gradient_y": 1)", some), StartsWith("/stages/1/gradient_y: with a change of 1"));
   EXPECT_THAT(render(R"("bead_level": 100)", ""),
               HasSubstr("/stages/1/from: the simulated bed stores no frames, so there is nothing to photograph. Add "
                         "\"frames\": {\"count\": 640} to "));
@@ -425,6 +429,33 @@ TEST_F(StageMistakes, OfBeadsThatAreNone) {
   EXPECT_THAT(extract("1 m"),
               StartsWith("/stages/0/diameter: the bead has a diameter of 1 m, but beads of experiments are 50 um to a "
                          "few cm. Did you mean \"1 mm\"?"));
+}
+
+TEST_F(StageMistakes, OfTwoKindsOfBeadsAndOfHeights) {
+  const auto extract = [&](const char* keys) {
+    return said_of(R"({ "stage": "extract", "images": "p.csv", "diameter": "3 mm", )" + std::string(keys) + " }");
+  };
+  EXPECT_EQ(extract(R"("second_diameter": "60 mm")"), "");
+  EXPECT_EQ(extract(R"("second_diameter": "0.15 mm")"), "");
+  EXPECT_EQ(extract(R"("second_diameter": "6.1 cm")"),
+            "/stages/0/second_diameter: it is 20.3 times the diameter; two kinds of beads are found up to a ratio of "
+            "20. Check its unit");
+  EXPECT_THAT(extract(R"("second_diameter": "2 um")"),
+              StartsWith("/stages/0/second_diameter: it is 0.000667 times the diameter"));
+  EXPECT_EQ(extract(R"("highest": 0.1)"), "");
+  EXPECT_EQ(extract(R"("lowest": -3, "highest": -1)"), "");
+  EXPECT_EQ(extract(R"("floor_amplitude": "3 mm", "highest": -0.5)"), "") << "heights begin at -1 D there";
+  EXPECT_EQ(extract(R"("highest": 0)"),
+            "/stages/0/highest: the profile is to end at 0 D, but it begins at 0 D. Give a \"highest\" above "
+            "\"lowest\"");
+  EXPECT_THAT(extract(R"("lowest": 4.5, "highest": 3)"),
+              StartsWith("/stages/0/highest: the profile is to end at 3 D, but it begins at 4.5 D"));
+}
+
+TEST_F(StageMistakes, OfCountsHaveTheirOwnBounds) {
+  EXPECT_THAT(said_of(R"({ "stage": "simulate", "units": "reduced", "disks": { "count": 5e9 },
+                           "box": { "width": 10.3, "sides": "periodic" }, "measure": 40 })"),
+              StartsWith("/stages/0/disks/count: must lie from 1 to 4294967295, got 5e9"));
 }
 
 TEST_F(StageMistakes, OfTheMapsOfAChart) {

@@ -35,6 +35,7 @@ TEST(ContactDurationEffect, OfABouncingDiskIsItsSecondContactsEnergy) {
   EXPECT_NEAR(effect.elastic_share, 0.5, 1e-15);
   EXPECT_NEAR(effect.withheld_share, e * e, 1e-12);
   EXPECT_EQ(contact_duration_effect(after, after, 0).withheld_share, 0);
+  EXPECT_EQ(contact_duration_effect(before, after, 0).withheld_share, 1) << "its only contact was elastic";
   // The third contact keeps the same energy again.
   simulation->advance_to(2 + 4 * e * 2 + 0.01);
   EXPECT_EQ(simulation->counters().elastic_contacts, 2u);

@@ -328,8 +328,14 @@ TEST(StartByHand, RefusesRowsThatDoNotFit) {
   };
   Scene scene = plain();
   scene.start = HexagonalStart{9, 0};  // 7 D for 8.5 spacings
+  EXPECT_EQ(
+      said(scene),
+      "9 disks a row are 0.823529 D apart, but their diameter is up to 1 D. Give fewer disks a row and a spacing of "
+      "at least 1, or 0 for both: as many as fit");
+  scene.start = HexagonalStart{0, 0.5};  // as many as fit at half a diameter
   EXPECT_EQ(said(scene),
-            "10 disks of up to 1 D do not fit into a box 8 D wide and inf D high. Give fewer disks or a larger box");
+            "14 disks a row are 0.5 D apart, but their diameter is up to 1 D. Give fewer disks a row and a spacing of "
+            "at least 1, or 0 for both: as many as fit");
   scene.start = HexagonalStart{7, 0};
   EXPECT_EQ(said(scene), "");
   Scene fluid = weightless(6, 6);
