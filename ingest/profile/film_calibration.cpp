@@ -47,11 +47,20 @@ std::vector<const GrayFrame*> pointers_to(const std::vector<GrayFrame>& frames) 
   return pointers;
 }
 
+// Why a frame shows no beads of this radius; empty: it may.
+std::string why_not_in(const GrayFrame& frame, double radius_px) {
+  if (2 * radius_px <= std::min(frame.width, frame.height)) return {};
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "by the radius or the scale given, a bead is %.4g px wide, but the frame has %d x %d px", 2 * radius_px,
+                frame.width, frame.height);
+  return text;
+}
+
 // Beads of the second diameter by their rims, if they are seen.
-std::optional<FinderCalibration> learn_second_by_rims(const GrayFrame& frame, const FinderCalibration& first,
-                                                      const MeasureOptions& options) {
+std::optional<FinderCalibration> learn_second_by_rims(const GrayFrame& frame, double expected,
+                                                      const FinderCalibration& first, const MeasureOptions& options) {
   FindOptions find = options.find;
-  const double expected = first.radius_px * *options.second_diameter_m / options.bead_diameter_m;
   find.seen = BeadsSeen{first.polarity, expected};
   find.radius_px.reset();
   constexpr double nearly = 0.1;
@@ -148,7 +157,10 @@ class FilmLearner {
     straight_.push_back(straightened(frame));
     recorded_.push_back(std::move(frame));
     const PictureThreads threads(threads_for(recorded_.back().width, recorded_.back().height));
-    CalibrationResult attempt = calibrated_.found ? learn_beads(pointers_to(straight_), find_) : learned_from_one();
+    CalibrationResult attempt;
+    attempt.why_not = why_not_in(straight_.back(), find_.radius_px.value_or(0));
+    if (attempt.why_not.empty())
+      attempt = calibrated_.found ? learn_beads(pointers_to(straight_), find_) : learned_from_one();
     if (!attempt.found) {
       if (first_reason.empty()) first_reason = attempt.why_not;
       straight_.pop_back();
@@ -265,6 +277,15 @@ class FilmLearner {
     if (all_by_rims && lens_.plain()) film_.by_rims = FoundByRims{last_learned_from_, std::move(found)};
   }
 
+  // Radius that the second kind has in pixels if what was seen first is of the first kind.
+  [[nodiscard]] double second_radius() const {
+    return calibrated_.calibration.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
+  }
+  [[nodiscard]] bool may_show_second() const {
+    constexpr double least_px = 1.5;  // smaller ones have no rim that could be told from noise
+    return second_radius() >= least_px && why_not_in(straight_.back(), second_radius()).empty();
+  }
+
   // What was seen first may be of either kind, or of both.
   bool learn_both_kinds() {
     MeasureOptions& options = film_.options;
@@ -274,6 +295,7 @@ class FilmLearner {
     const bool first_is_large = ratio < 1;
     const BeadsSeen seen =
         find_.seen.value_or(BeadsSeen{calibrated_.calibration.polarity, calibrated_.calibration.rim_radius_px});
+    if (!may_show_second()) return false;
     KindsAsked asked;
     asked.ratio = first_is_large ? 1 / ratio : ratio;
     asked.polarity = seen.polarity;
@@ -307,7 +329,13 @@ class FilmLearner {
 
   void learn_second() {
     const FinderCalibration& first = calibrated_.calibration;
-    film_.second = learn_second_by_rims(straight_.back(), first, film_.options);
+    if (!may_show_second()) {
+      char text[200];
+      std::snprintf(text, sizeof text, "they would be %.3g px wide in a frame of %d x %d px.", 2 * second_radius(),
+                    first.width, first.height);
+      return warn_of_no_second(text);
+    }
+    film_.second = learn_second_by_rims(straight_.back(), second_radius(), first, film_.options);
     if (!film_.second) warn_of_no_second("no rims of this radius were found.");
   }
 

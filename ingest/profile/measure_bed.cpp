@@ -107,6 +107,9 @@ class OrderedFrames {
   std::exception_ptr failure_;
 };
 
+// Each pair of heights has a covariance.
+constexpr double most_heights = 5000;
+
 class BedMeasurer {
  public:
   BedMeasurer(FrameSource& source, const MeasureOptions& asked)
@@ -131,6 +134,7 @@ class BedMeasurer {
   Measurement measure() {
     find_all();
     place_held();
+    if (std::ranges::none_of(counts_, [](double count) { return count > 0; })) refuse();
     result_.finder.radius_px = refined_.radius_px;
     result_.finder.radius_std_error_px = refined_.radius_std_error_px;
     if (options_.frame_rate_hz) {
@@ -293,7 +297,13 @@ class BedMeasurer {
 
   [[nodiscard]] std::size_t bins_up_to(double top) const {
     if (!(top > bins_.lowest)) return 0;
-    return static_cast<std::size_t>(std::clamp(std::ceil((top - bins_.lowest) / bins_.width - 1e-9), 1.0, 1e5));
+    const double count = std::max(1.0, std::ceil((top - bins_.lowest) / bins_.width - 1e-9));
+    if (count > most_heights)
+      throw std::invalid_argument(
+          formatted("measure_bed: the profile would have %.3g heights from %g to %g D, more than %g: choose a larger "
+                    "spacing, or lower its highest height",
+                    count, bins_.lowest, top, most_heights));
+    return static_cast<std::size_t>(count);
   }
 
   // A frame's disks in heights, its densities.
@@ -432,6 +442,12 @@ class BedMeasurer {
   void count_disks() {
     std::tie(result_.disk_count_mean, result_.disk_count_std) = mean_and_scatter(counts_);
     std::tie(result_.count_in_width_mean, result_.count_in_width_std) = mean_and_scatter(counts_in_width_);
+  }
+
+  [[noreturn]] void refuse() const {
+    throw NoDisksError("the frames", "disks were found in none of the " + std::to_string(result_.frames.size()) + " frames",
+                       result_.frames.empty() ? "the stream is empty" : result_.frames.front().why,
+                       "check that sharp beads, at least 10 px wide, are visible");
   }
 
   // What else deserves a word.

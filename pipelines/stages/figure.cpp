@@ -589,7 +589,12 @@ class ProfilePicture {
   }
 
   void draw(const std::optional<double>& highest, Drawings& drawings) {
-    if (picture_.series.empty()) throw InputError("there is nothing to draw: \"from\" names no profile and no fit");
+    if (picture_.series.empty())
+      throw InputError(
+          context_.find_input("fit") == nullptr
+              ? "there is nothing to draw: \"from\" names no profile and no fit"
+              : "there is nothing to draw: the fit in \"from\" has no curve (its warnings say why). Name the stage of "
+                "the profile in \"from\" too: the figure then shows what was measured");
     picture_.x_low = 0;
     picture_.x_high = highest ? *highest : std::ceil(end_ + 0.5);
     picture_.y_low = 0;

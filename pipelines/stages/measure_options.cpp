@@ -28,7 +28,8 @@ void BedMeasureOptions::describe(Fields& fields) {
   fields.object<sim::MeasureOptions>(
       "frames", measure_,
       [](Fields& f, sim::MeasureOptions& frames) {
-        f.integer("count", frames.frames, {.help = "number of frames of the trajectory that are stored; 0: none"});
+        f.integer("count", frames.frames,
+                  {.help = "number of frames of the trajectory that are stored; 0: none", .range = from_to(0, 1e7)});
         f.integer(
             "phases", frames.phases,
             {.help =

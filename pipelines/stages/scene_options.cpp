@@ -499,6 +499,12 @@ void SceneOptions::check_scene(Fields& fields) const {
                    "Give \"pressing\"");
     if (fields.problem_count() > 0) return;
   }
+  constexpr double longest_contact = 1;  // in this time a disk falls by its radius
+  fields.require(
+      contact_duration() <= longest_contact, "disks/contact_duration",
+      fmt::format("a contact would last {:.3g} sqrt(D/g), and in one sqrt(D/g) a disk falls by its radius",
+                  contact_duration()),
+      fmt::format("Leave it out, which means {:g} sqrt(D/g), or give a much shorter one", usual_contact_duration));
   const sim::Scene laid_out = scene(1);
   const std::vector<sim::SceneProblem> problems = sim::check(laid_out);
   // Lengths are in D here: a bead that is too large, as by a number without unit, makes the box too small.

@@ -97,6 +97,7 @@ class Simulate : public Stage, public Scalable {
     return bed_.description().reduced ? Json(value) : Json(quantity_text(value, wanted));
   }
   void check(Fields& fields);
+  void check_heights(Fields& fields);
   sim::MeasureOptions measure_options() const;  // reduced; the bed settles after the annealing
   sim::LookPlan looks() const { return sim::plan_looks(bed_.period(), measure_options()); }
   FramePlan frame_plan() const;
@@ -183,12 +184,23 @@ void Simulate::check(Fields& fields) {
                  "\"pressure\" is the pressure as a function of height, but the box is periodic upwards",
                  "Leave it out: compressibility_factor is always measured");
   measure_.check(fields, bed_.period(), bed_.time_unit());
+  if (fields.problem_count() == 0) check_heights(fields);
   if (!replicas_)
     replicas_ = bed_.period() > 0 && bed_.contact_duration() > 0 && bed_.may_be_filled_at_random() &&
                         !fields.has_upstream("simulate")
                     ? replicas_of_shaken
                     : 1;
   bed_.warn(fields, measure_.settle());
+}
+
+// The covariances of so many heights take some 6 GB where the bed fills them as it does with a spacing of 0.0015 D.
+void Simulate::check_heights(Fields& fields) {
+  constexpr double most_kept = 4e4;
+  const HeightGrid grid = measurement_plan(bed_.scene(1)).grid;
+  const auto heights = static_cast<double>(grid.points);
+  fields.require(heights <= most_kept, "profile/spacing",
+                 fmt::format("the profile would have {:.0f} heights, and a covariance of each pair", heights),
+                 fmt::format("Give {:.2g} or more", 1.005 * grid.spacing * heights / most_kept));
 }
 
 sim::MeasureOptions Simulate::measure_options() const {

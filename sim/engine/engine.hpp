@@ -62,8 +62,9 @@ namespace shakebed::sim {
 // Bound on what rounding alone may do to a time or a distance, used in asserts [sqrt(D/g), D]. It is a thousand times
 // what hard cases show (1e-12 at speeds of 1000 sqrt(g D)).
 inline constexpr double asserted_rounding = 1e-9;
-// Length of the hop of a disk at rest on the floor without a contact clock [sqrt(D/g)].
-inline constexpr double rest_hop = 1e-4;
+// Duration of the hop of a disk at rest on the floor: that of a contact, or this without a contact clock. A disk that
+// hopped for longer would be thrown [sqrt(D/g)].
+inline constexpr double rest_hop = 1e-4, longest_hop = 0.1;
 
 // In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
 enum class Order { of_time, of_tiles, of_the_rest };

@@ -30,7 +30,7 @@ void Engine<Space, Rule, Sizes>::hit_slope(std::uint32_t i, Motion& motion, bool
   bounce(i, motion, nx, nz, floor.velocity, side_surface_);
   floor_work_ += mass * (motion.vz() - vz) * floor.velocity;
   // A disk that lies on the side is carried in small hops, as on the floor.
-  const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
+  const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
   const double slowest = 0.5 * (gravity_ + floor.acceleration) * slope_sine_ * hop;
   const double away = -(motion.vx() * nx + (motion.vz() - floor.velocity) * nz);
   if (away < 1e-3 * slowest) {

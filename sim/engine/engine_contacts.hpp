@@ -205,7 +205,7 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   // A disk that lies still on the floor is carried in small hops: a contact has
   // to end before the next can begin.
   const double pressing = gravity_ + floor.acceleration;
-  const double hop = contact_duration_ > 0 ? contact_duration_ : rest_hop;
+  const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
   const double slowest = 0.5 * pressing * hop;
   if (motion.vz() - floor.velocity < 1e-3 * slowest) {
     const double slow = motion.vz();

@@ -287,6 +287,32 @@ TEST(ExtractedFrames, HaveBeadsAtTheHeightsOfTheProfile) {
       ThrowsMessage<std::invalid_argument>(HasSubstr("the lowest height of the profile, 6.5 D, lies above all beads")));
 }
 
+// A bed of 6.4 D.
+TEST(ExtractedFrames, HaveNoMoreHeightsThanCovariancesAllow) {
+  RenderedFrames frames(bed_of_camera(), 1);
+  frames.options.spacing = 0.001;
+  EXPECT_THAT([&] { frames.extracted(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("choose a larger spacing, or lower its highest height")));
+  frames.options.lowest = 0, frames.options.highest = 4.9;
+  EXPECT_NO_THROW(frames.extracted());
+}
+
+TEST(ExtractedFrames, HaveBeadsOfARadiusThatFits) {
+  RenderedFrames frames(bed_of_camera(), 1);
+  frames.options.radius = 80;
+  EXPECT_THAT([&] { frames.extracted(); },
+              ThrowsMessage<StageError>(HasSubstr("by the radius or the scale given, a bead is 160 px wide, but the "
+                                                  "frame has 150 x 148 px")));
+  frames.options.radius.reset();
+  for (const double second : {0.03, 0.0003}) {  // 150 px and 1.5 px wide
+    frames.options.second_diameter = second;
+    frames.stage.warnings.clear();
+    frames.extracted();
+    EXPECT_THAT(frames.stage.warnings,
+                Contains(HasSubstr("No beads of the second diameter were found: they would be")));
+  }
+}
+
 TEST(ExtractedFrames, KnowThatTheirSidesArePeriodic) {
   BedDescription bed = bed_of_camera();
   bed.periodic = true;

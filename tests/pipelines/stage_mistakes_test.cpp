@@ -452,6 +452,25 @@ TEST_F(StageMistakes, OfTwoKindsOfBeadsAndOfHeights) {
               StartsWith("/stages/0/highest: the profile is to end at 3 D, but it begins at 4.5 D"));
 }
 
+// 40 disks in 10.3 D: 53.3 D, and 5 D below the floor; by a bath of T = 1 25 D more.
+TEST_F(StageMistakes, OfProfilesOfTooManyHeights) {
+  EXPECT_EQ(said_of(bed(warmed + R"(, "profile": { "spacing": 0.0025 })")), "");
+  EXPECT_EQ(said_of(bed(warmed + R"(, "profile": { "spacing": 0.001 })")),
+            "/stages/0/profile/spacing: the profile would have 82300 heights, and a covariance of each pair. Give "
+            "0.0021 or more");
+}
+
+TEST_F(StageMistakes, OfContactsThatLastTooLong) {
+  const auto said = [&](const std::string& duration) {
+    return said_of(R"({ "stage": "simulate", "disks": { "count": 40, "diameter": "9.81 mm", "contact_duration": ")" +
+                   duration + R"(" }, "box": { "width": "103 mm", "sides": "periodic" }, "measure": "1 s" })");
+  };
+  EXPECT_EQ(said("31 ms"), "");  // sqrt(D/g) is 31.6 ms
+  EXPECT_EQ(said("63.2455532 ms"),
+            "/stages/0/disks/contact_duration: a contact would last 2 sqrt(D/g), and in one sqrt(D/g) a disk falls by "
+            "its radius. Leave it out, which means 0.0001 sqrt(D/g), or give a much shorter one");
+}
+
 TEST_F(StageMistakes, OfCountsHaveTheirOwnBounds) {
   EXPECT_THAT(said_of(R"({ "stage": "simulate", "units": "reduced", "disks": { "count": 5e9 },
                            "box": { "width": 10.3, "sides": "periodic" }, "measure": 40 })"),

@@ -1,10 +1,12 @@
 // What the contact duration withholds from dissipation, against a bed for pencil and paper and against the temperature.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/engine/simulation.hpp"
 #include "sim/measure/contact_duration.hpp"
+#include "tests/sim/snapshot_of.hpp"
 
 namespace shakebed::sim {
 namespace {
@@ -59,6 +61,26 @@ TEST(ContactDurationEffect, CountsTheReducedMassOfTwoDisks) {
   const Counters counters = simulation->counters();
   ASSERT_EQ(counters.disk_collisions, 2u);
   EXPECT_NEAR(counters.withheld, 0.5 * 0.5 * (1 - e * e) * 1, 1e-12);
+}
+
+// Hops of 0.1 sqrt(D/g) reach 0.1^2/8 D, however long a contact is said to last.
+TEST(ContactDurationEffect, DoesNotThrowADiskThatLiesOnTheFloor) {
+  Scene scene;
+  scene.gravity = UniformGravity{};
+  scene.disks.species = {{1, 1, 1}};
+  scene.disks.contact_duration = 10;
+  scene.box.width = 4;
+  scene.box.floor_surface.restitution = 0.5;
+  scene.rests = scene.presses = false;
+  scene.start = PlacedStart{{{2, 0.5 + 1e-12, 0, 0, 0, 0}}};
+  const auto simulation = simulate(scene);
+  double highest = 0;
+  for (int k = 1; k <= 400; ++k) {
+    simulation->advance_to(0.1 * k + 0.013);
+    highest = std::max(highest, snapshot_of(*simulation).z[0] - 0.5);
+  }
+  EXPECT_GT(highest, 0);
+  EXPECT_LE(highest, 0.01 / 8 + 1e-9);
 }
 
 TEST(ContactDurationEffect, NamesADurationThatIsShortEnough) {
