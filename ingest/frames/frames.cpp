@@ -363,6 +363,8 @@ const char* name_of(Channel channel) {
       return "saturation";
     case Channel::background_distance:
       return "background_distance";
+    case Channel::grey_distance:
+      return "grey_distance";
   }
   return "automatic";
 }

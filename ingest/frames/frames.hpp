@@ -60,8 +60,18 @@ struct FrameOrigin {
 
 // The level computed from a colour pixel. `automatic`: red, green or blue, whichever has the best contrast in the first
 // colour frame, for the whole stream. `background_distance`: the distance from the most frequent colour of the first
-// colour frame. `saturation`: the largest component less the smallest.
-enum class Channel { automatic = -1, red = 0, green = 1, blue = 2, grey = 3, saturation = 4, background_distance = 5 };
+// colour frame. `saturation`: the largest component less the smallest. `grey_distance`: the distance of the grey level
+// from that of the background of the first frame, which follows the light (background_level.hpp).
+enum class Channel {
+  automatic = -1,
+  red = 0,
+  green = 1,
+  blue = 2,
+  grey = 3,
+  saturation = 4,
+  background_distance = 5,
+  grey_distance = 6
+};
 const char* name_of(Channel channel);
 
 struct FrameSourceOptions {

@@ -233,7 +233,7 @@ int reduction_of_colours(const cv::Mat& picture, int reduction) {
   return reduction % surveyed == 0 ? surveyed : reduction;
 }
 
-GrayFrame levels_of(cv::Mat picture, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
+GrayFrame mixed_levels_of(cv::Mat picture, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
   GrayFrame frame;
   frame.width = picture.cols;
   frame.height = picture.rows;
@@ -258,6 +258,15 @@ GrayFrame levels_of(cv::Mat picture, const std::string& path, const FrameSourceO
     copy_floats(picture, path, rule, frame);
   }
   return frame;
+}
+
+GrayFrame levels_of(cv::Mat picture, const std::string& path, const FrameSourceOptions& options, GreyRule& rule) {
+  if (options.channel != Channel::grey_distance) return mixed_levels_of(std::move(picture), path, options, rule);
+  FrameSourceOptions of_grey = options;
+  of_grey.channel = Channel::grey;
+  const GrayFrame grey = mixed_levels_of(std::move(picture), path, of_grey, rule);
+  if (!rule.level) rule.level.emplace(grey);
+  return rule.level->distance_of(grey);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "ingest/frames/background_level.hpp"
 #include "ingest/frames/frames.hpp"
 
 namespace shakebed::ingest {
@@ -14,6 +15,7 @@ struct GreyRule {
   Channel channel = Channel::automatic;  // automatic: not decided
   double depth_scale = 0;                // factor to 0..255 for 16-bit and float files; 0 not decided
   std::optional<cv::Vec3f> background;   // blue, green, red: the most frequent colour
+  std::optional<BackgroundLevel> level;  // of grey_distance
 };
 
 // Averages over factor x factor pixels.

@@ -24,8 +24,8 @@ const std::vector<std::string>& shape_names() {
   return names;
 }
 const std::vector<std::string>& channel_names() {
-  static const std::vector<std::string> names{"automatic",          "red", "green", "blue", "grey", "saturation",
-                                              "background_distance"};
+  static const std::vector<std::string> names{
+      "automatic", "red", "green", "blue", "grey", "saturation", "background_distance", "grey_distance"};
   return names;
 }
 
@@ -136,7 +136,7 @@ void add_picture_options(CLI::App& command, ImageArguments& image) {
       ->check(CLI::IsMember(polarity_names()));
   command.add_option("--radius", image.radius, "radius of a bead in pixels, within 25 % (default: found)")
       ->check(CLI::PositiveNumber);
-  command.add_option("--channel", image.channel, "part of a colour picture that is used (default: automatic)")
+  command.add_option("--channel", image.channel, "part of a picture that is used (default: automatic)")
       ->check(CLI::IsMember(channel_names()));
   command
       .add_option("--shape", image.shape,

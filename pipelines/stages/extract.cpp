@@ -63,9 +63,12 @@ void describe_beads(Fields& fields, ExtractOptions& o) {
                  {BeadChannel::blue, "blue"},
                  {BeadChannel::grey, "grey"},
                  {BeadChannel::saturation, "saturation"},
-                 {BeadChannel::background_distance, "background_distance"}},
-                {.help = "part of a colour picture that is used. Saturation: largest minus smallest of red, green and "
-                         "blue. Background_distance: distance from the most frequent colour"});
+                 {BeadChannel::background_distance, "background_distance"},
+                 {BeadChannel::grey_distance, "grey_distance"}},
+                {.help = "part of a picture that is used. Saturation: largest minus smallest of red, green and blue. "
+                         "Background_distance: distance from the most frequent colour. Grey_distance: distance of the "
+                         "grey level from that of the background, which may vary slowly. The last one serves grey "
+                         "pictures, too"});
   fields.choice("shape", o.shape, {{BeadShape::round, "round"}, {BeadShape::any, "any"}},
                 {.help = "outlines that are accepted as beads: round, or any. With any, oval and rough outlines are "
                          "measured too, with a warning"});

@@ -34,7 +34,7 @@ struct RenderOptions {
 
 enum class BeadPolarity { automatic, dark, bright };
 enum class BeadShape { round, any };
-enum class BeadChannel { automatic, red, green, blue, grey, saturation, background_distance };
+enum class BeadChannel { automatic, red, green, blue, grey, saturation, background_distance, grey_distance };
 
 // Pixels count from the centre of the top-left one, x to the right, y downwards.
 struct ExtractOptions {

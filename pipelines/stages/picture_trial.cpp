@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "ingest/frames/background_level.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/photographs.hpp"
 
@@ -40,7 +41,8 @@ void judge_missed(const ExtractOptions& options, double missed, Judgement& judge
 }
 
 // Of the channel, or of the only one.
-const ingest::GrayFrame& frame_in(const ingest::ChannelFrames& frames, ingest::Channel channel) {
+ingest::GrayFrame frame_in(const ingest::ChannelFrames& frames, ingest::Channel channel) {
+  if (channel == ingest::Channel::grey_distance) return ingest::grey_distance_of(frames);
   const auto its = std::find_if(frames.channels.begin(), frames.channels.end(),
                                 [&](const auto& one) { return one.channel == channel; });
   return (its != frames.channels.end() ? *its : frames.channels.front()).frame;

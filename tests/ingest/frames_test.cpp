@@ -346,7 +346,7 @@ INSTANTIATE_TEST_SUITE_P(Frames, Films,
 TEST(Frames, ChannelsAreNumberedFromTheAutomaticOneOn) {
   int number = -1;
   for (const Channel channel : {Channel::automatic, Channel::red, Channel::green, Channel::blue, Channel::grey,
-                                Channel::saturation, Channel::background_distance})
+                                Channel::saturation, Channel::background_distance, Channel::grey_distance})
     EXPECT_EQ(static_cast<int>(channel), number++) << name_of(channel);
 }
 

@@ -181,6 +181,7 @@ TEST(CandidatesOfAPicture, AreOptionsOfTheCommand) {
   for (const auto& [channel, same] : {std::pair{BeadChannel::red, ingest::Channel::red},
                                       {BeadChannel::saturation, ingest::Channel::saturation},
                                       {BeadChannel::background_distance, ingest::Channel::background_distance},
+                                      {BeadChannel::grey_distance, ingest::Channel::grey_distance},
                                       {BeadChannel::automatic, ingest::Channel::automatic}})
     EXPECT_EQ(channel_of(channel), same);
 }
