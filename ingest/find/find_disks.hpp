@@ -70,6 +70,7 @@ struct FindOptions {
   bool keep_half_hidden = false;  // report beads that fail the interior test, flagged
   bool learn_rim = false;         // fill FindResult::profile
   double recorded_px = 1;         // px as recorded to one px of the frame: messages state the former
+  bool distances = false;         // levels are distances from the background: 0 along a line across each lit sphere
 
   // Why nothing can be found with these options, one sentence each; empty when it can.
   [[nodiscard]] std::vector<std::string> validate() const;

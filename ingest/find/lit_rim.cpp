@@ -21,6 +21,14 @@ constexpr std::size_t enough_circles = 400;                  // enough for the m
 constexpr double steep_from = 0.5;                           // of the steepest edge
 constexpr int fewest_steep = ray_count / 3;
 constexpr double most_uneven = 0.05;  // radii, rms of the steep edges about their circle
+// Of two sides, each shows so many steep edges at least, and their middles lie in directions that are so far apart at
+// least: the cosine of the angle.
+constexpr int fewest_of_a_side = ray_count / 8;
+constexpr double opposite_sides = -0.5;
+// A circle through the bright side alone may lie so far from the dark side: radii, as above.
+constexpr double far_ray_reach = 1.9, far_steep = 1.8;
+constexpr int most_recentred = 4;        // times that circles are moved to what they led to
+constexpr double recentred_well = 0.01;  // radii
 
 double typical_radius(const std::vector<Circle>& circles) {
   std::vector<double> radii;
@@ -53,16 +61,22 @@ cv::Mat mean_rays(const GrayFrame& frame, const std::vector<Circle>& circles, do
 
 struct SteepEdge {
   double x = 0, y = 0;  // px from the centre of the circles
-  double slope = 0;     // grey levels per step along the ray
+  double slope = 0;     // grey levels per step along the ray, in the sign asked for
 };
 
-// The steepest edge along each ray.
-std::vector<SteepEdge> steepest_edges(const cv::Mat& rays, double step_px, double radius, double sign) {
-  cv::Mat smooth, slope;
-  cv::GaussianBlur(rays, smooth, {0, 0}, ray_smoothing * radius / step_px, 0.5);
-  cv::Sobel(smooth, slope, CV_32F, 1, 0, 1, sign);
-  const int from = static_cast<int>(nearest_steep * radius / step_px);
-  const int to = std::min(ray_steps - 2, static_cast<int>(farthest_steep * radius / step_px));
+struct EdgeRange {
+  double radius = 0;                 // px, of the circles
+  double farthest = farthest_steep;  // radii
+};
+
+// The steepest edge along each ray, of dark beads, of bright ones, or of either.
+std::vector<SteepEdge> steepest_edges(const cv::Mat& rays, double step_px, const EdgeRange& range, Polarity polarity) {
+  cv::Mat smooth, rise, slope;
+  cv::GaussianBlur(rays, smooth, {0, 0}, ray_smoothing * range.radius / step_px, 0.5);
+  cv::Sobel(smooth, rise, CV_32F, 1, 0, 1, polarity == Polarity::bright_beads ? -1 : 1);
+  slope = polarity == Polarity::automatic ? cv::Mat(cv::abs(rise)) : rise;
+  const int from = static_cast<int>(nearest_steep * range.radius / step_px);
+  const int to = std::min(ray_steps - 2, static_cast<int>(range.farthest * range.radius / step_px));
   std::vector<SteepEdge> edges;
   for (int k = 0; k < ray_count; ++k) {
     const auto at = [&](int column) { return static_cast<double>(slope.at<float>(k, column)); };
@@ -73,7 +87,8 @@ std::vector<SteepEdge> steepest_edges(const cv::Mat& rays, double step_px, doubl
     const double bend = at(best - 1) - 2 * at(best) + at(best + 1);
     const double place = best + (bend < 0 ? 0.5 * (at(best - 1) - at(best + 1)) / bend : 0);
     const double angle = 2 * std::numbers::pi * k / ray_count;
-    edges.push_back({place * step_px * std::cos(angle), place * step_px * std::sin(angle), at(best)});
+    edges.push_back({place * step_px * std::cos(angle), place * step_px * std::sin(angle),
+                     static_cast<double>(rise.at<float>(k, best))});
   }
   return edges;
 }
@@ -94,6 +109,12 @@ std::optional<LitRim> circle_through(const std::vector<SteepEdge>& edges) {
   return LitRim{std::sqrt(squared), solved[0], solved[1], 0};
 }
 
+void drop_gentle(std::vector<SteepEdge>& edges) {
+  double steepest = 0;
+  for (const SteepEdge& edge : edges) steepest = std::max(steepest, edge.slope);
+  std::erase_if(edges, [&](const SteepEdge& edge) { return !(edge.slope >= steep_from * steepest && edge.slope > 0); });
+}
+
 double rms_about(const LitRim& circle, const std::vector<SteepEdge>& edges) {
   double squares = 0;
   for (const SteepEdge& edge : edges) {
@@ -111,16 +132,66 @@ std::optional<LitRim> lit_rim_of(const GrayFrame& frame, const std::vector<Circl
   const cv::Mat rays = mean_rays(frame, circles, reach);
   if (rays.empty()) return std::nullopt;
   std::vector<SteepEdge> edges =
-      steepest_edges(rays, reach / ray_steps, radius, polarity == Polarity::dark_beads ? 1 : -1);
-  double steepest = 0;
-  for (const SteepEdge& edge : edges) steepest = std::max(steepest, edge.slope);
-  std::erase_if(edges, [&](const SteepEdge& edge) { return !(edge.slope >= steep_from * steepest && edge.slope > 0); });
+      steepest_edges(rays, reach / ray_steps, {radius},
+                     polarity == Polarity::dark_beads ? Polarity::dark_beads : Polarity::bright_beads);
+  drop_gentle(edges);
   if (std::ssize(edges) < fewest_steep) return std::nullopt;
   std::optional<LitRim> rim = circle_through(edges);
   if (!rim || rms_about(*rim, edges) > most_uneven * rim->radius_px) return std::nullopt;
   rim->rms_radii = rms_about(*rim, edges) / rim->radius_px;
   rim->steep = static_cast<double>(edges.size()) / ray_count;
   return rim;
+}
+
+namespace {
+
+// The sum of the directions of edges, at most 1 long.
+cv::Vec2d direction_of(const std::vector<SteepEdge>& edges) {
+  cv::Vec2d sum(0, 0);
+  for (const SteepEdge& edge : edges) sum += cv::Vec2d(edge.x, edge.y) / std::hypot(edge.x, edge.y);
+  return sum / std::max(1.0, cv::norm(sum));
+}
+
+// The steep edges of a bright side and of a dark side, each as steep as their side is, with equal weights. Empty unless
+// both are seen, opposite one another.
+std::vector<SteepEdge> edges_of_both_sides(const cv::Mat& rays, double step_px, double radius) {
+  std::vector<SteepEdge> bright, dark;
+  for (SteepEdge edge : steepest_edges(rays, step_px, {radius, far_steep}, Polarity::automatic)) {
+    std::vector<SteepEdge>& side = edge.slope < 0 ? bright : dark;
+    edge.slope = std::abs(edge.slope);
+    side.push_back(edge);
+  }
+  drop_gentle(bright), drop_gentle(dark);
+  if (std::ssize(bright) < fewest_of_a_side || std::ssize(dark) < fewest_of_a_side) return {};
+  if (direction_of(bright).dot(direction_of(dark)) > opposite_sides) return {};
+  bright.insert(bright.end(), dark.begin(), dark.end());
+  for (SteepEdge& edge : bright) edge.slope = 1;
+  return bright;
+}
+
+}  // namespace
+
+std::optional<LitRim> rim_of_both_sides(const GrayFrame& frame, std::vector<Circle> circles) {
+  if (circles.empty()) return std::nullopt;
+  double radius = typical_radius(circles);
+  cv::Vec2d moved(0, 0);
+  for (int round = 0; round < most_recentred; ++round) {
+    const cv::Mat rays = mean_rays(frame, circles, far_ray_reach * radius);
+    if (rays.empty()) return std::nullopt;
+    const std::vector<SteepEdge> edges = edges_of_both_sides(rays, far_ray_reach * radius / ray_steps, radius);
+    if (edges.empty()) return std::nullopt;
+    std::optional<LitRim> rim = circle_through(edges);
+    if (!rim || rms_about(*rim, edges) > most_uneven * rim->radius_px) return std::nullopt;
+    const cv::Vec2d by(rim->right_px, rim->down_px);
+    moved += by;
+    rim->rms_radii = rms_about(*rim, edges) / rim->radius_px;
+    rim->steep = static_cast<double>(edges.size()) / ray_count;
+    rim->right_px = moved[0], rim->down_px = moved[1];
+    if (std::abs(rim->radius_px - radius) + cv::norm(by) < recentred_well * radius) return rim;
+    radius = rim->radius_px;
+    for (Circle& circle : circles) circle.x += by[0], circle.y += by[1];
+  }
+  return std::nullopt;
 }
 
 }  // namespace shakebed::ingest

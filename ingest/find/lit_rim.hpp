@@ -24,4 +24,9 @@ struct LitRim {
 // a turn, or lie on no circle. Edges are those of dark beads, or else of bright ones.
 std::optional<LitRim> lit_rim_of(const GrayFrame& frame, const std::vector<Circle>& circles, Polarity polarity);
 
+// Of spheres whose lit side is brighter than the background and whose other side is darker: the circle on which both
+// sides end. `circles` show either side. Nothing where one of the sides is not seen, both are the same, or they end on
+// no circle.
+std::optional<LitRim> rim_of_both_sides(const GrayFrame& frame, std::vector<Circle> circles);
+
 }  // namespace shakebed::ingest

@@ -29,6 +29,7 @@ struct Packing {
   double noise = 0;        // over the contrast
   double shown = 0;        // share of the disks that a circle shows as well, where circles are known
   bool lit = false;        // the model of a disk is brighter on one side
+  bool distances = false;  // of levels that are distances from the background
   // Rms distance of the rim on that side from the circle of the disks, radii, where circles are known.
   double unevenness = HUGE_VAL;
   // Disks that touch, or lit ones that circles show, and what is beside them; and these lie close.
@@ -77,6 +78,7 @@ struct PackedStart {
   std::optional<double> radius_px;
   // Centres of circles of which one side is missing: beads of any size, worth a look at all of the picture.
   Places lit{};
+  bool distances = false;  // levels are distances from the background
 };
 // The first start that leads to small beads, or to lit ones. Of a large picture a part must convince before all of it
 // is looked at. Where beads are lit all of it is looked at: a part may show no background, whose level is then not

@@ -280,6 +280,7 @@ class ChannelTrials {
     asked.seen = BeadsSeen{polarity, radius_px(), best_.one_sided};
     if (asked.radius_px) *asked.radius_px /= all;
     asked.recorded_px = all;
+    asked.distances = best_.channel == Channel::grey_distance;
     return asked;
   }
 

@@ -18,6 +18,7 @@
 #include "ingest/find/picture_maps.hpp"
 #include "ingest/find/rim_probability.hpp"
 #include "ingest/find/settle_channel.hpp"
+#include "ingest/frames/background_level.hpp"
 #include "ingest/frames/picture_threads.hpp"
 #include "statistics/text.hpp"
 
@@ -53,6 +54,11 @@ constexpr double steep_all_round = 0.75;
 constexpr double nearly_round = 0.02;    // radii, rms of these edges about their circle
 constexpr double clearly_larger = 1.06;  // radii of the circles
 constexpr std::size_t fewest_lit = 8, most_lit_starts = 2;
+// Candidates whose rims are searched for a bright and a dark side: the first ones hold most circles. And by how much
+// the radius found may differ from that of the circle on which both sides end: up to 4 % for drawn spheres found in the
+// distance from the background, 14 to 28 % for circles through their bright sides alone.
+constexpr std::size_t most_two_sided = 3;
+constexpr double same_as_both_sides = 1.06;
 // Of the picture's shorter side: larger radii are not proposed, since a bed shows more than two beads in a row.
 constexpr double largest_proposed = 0.25;
 // px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
@@ -358,6 +364,7 @@ struct SurveyedPicture {
   Channel channel = Channel::automatic;
   int reduction = 1;
   const DrawingSigns& signs;
+  const std::optional<PackedStart>& both_sides;  // spheres of which both sides were seen in another channel
 };
 
 // Beads that lie close, or are lit from one side, by their faces. They come first where they explain more than circles
@@ -365,6 +372,8 @@ struct SurveyedPicture {
 void consider_packed_bed(Survey& survey, const SurveyedPicture& picture, const CircleCensus& census,
                          const SurveyOptions& options) {
   std::vector<PackedStart> starts = lit_starts(survey, picture.frame, picture.channel, picture.reduction);
+  if (picture.both_sides) starts.insert(starts.begin(), *picture.both_sides);
+  for (PackedStart& start : starts) start.distances = picture.channel == Channel::grey_distance;
   if (!survey.found || leaves_room(survey.candidates.front(), picture.reduction)) {
     const std::vector<PackedStart> others = starts_from(census, options, picture.reduction);
     starts.insert(starts.end(), others.begin(), others.end());
@@ -640,7 +649,8 @@ CircleCensus examine_channels(const SearchedChannels& in, const CensusOptions& o
   return census;
 }
 
-Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, Effort effort) {
+Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, Effort effort,
+                     const std::optional<PackedStart>& both_sides = {}) {
   Survey survey;
   const SearchedChannels in = channels_to_search(frames, options, effort);
   const std::vector<const ChannelFrames::One*>& channels = in.channels;
@@ -661,9 +671,9 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
                    });
   survey.found = !survey.candidates.empty() && survey.candidates.front().credible;
   if (effort == Effort::glance && !survey.found) return survey;
-  if (!survey.found || !survey.candidates.front().region) {
+  if (both_sides || !survey.found || !survey.candidates.front().region) {
     const std::size_t channel = census.hypotheses.empty() ? 0 : census.hypotheses.front().channel;
-    SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs};
+    SurveyedPicture picture{*pictures[channel], channels[channel]->channel, frames.reduction, signs, both_sides};
     consider_packed_bed(survey, picture, census, options);
   }
   if (survey.found) {
@@ -677,6 +687,57 @@ Survey survey_of_all(const ChannelFrames& frames, const SurveyOptions& options, 
   }
   if (!survey.found) survey.why_not = why_none(survey);
   return survey;
+}
+
+bool are_the_same(double radius, double other) { return std::max(radius / other, other / radius) < same_as_both_sides; }
+
+// Spheres lit from one side, whose other side is darker than the background: the circle on which both sides end, px of
+// the frames that were read.
+std::optional<PackedStart> both_sides_of(const SurveyCandidate& candidate, const GrayFrame& frame, int reduction) {
+  std::vector<Circle> circles = circles_of(candidate.disks);
+  for (Circle& circle : circles) circle = in_reduced_frame(circle, reduction);
+  const auto rim = rim_of_both_sides(frame, circles);
+  if (!rim) return std::nullopt;
+  Places places = places_of(circles);
+  for (auto& [x, y] : places) x += rim->right_px, y += rim->down_px;
+  return PackedStart{Polarity::bright_beads, rim->radius_px, std::move(places)};
+}
+
+// Of the first candidates that show it, each with circles of its own.
+std::optional<PackedStart> both_sides_seen(const Survey& survey, const ChannelFrames& frames) {
+  std::vector<const SurveyCandidate*> looked;
+  for (const SurveyCandidate& candidate : survey.candidates) {
+    const bool known = std::any_of(looked.begin(), looked.end(), [&](const SurveyCandidate* one) {
+      return one->channel == candidate.channel && one->rims.polarity == candidate.rims.polarity &&
+             are_the_same(one->rims.radius_px, candidate.rims.radius_px);
+    });
+    if (known || candidate.disks.size() < fewest_lit || looked.size() == most_two_sided) continue;
+    looked.push_back(&candidate);
+    const auto its = std::find_if(frames.channels.begin(), frames.channels.end(),
+                                  [&](const ChannelFrames::One& one) { return one.channel == candidate.channel; });
+    if (its == frames.channels.end()) continue;
+    if (auto start = both_sides_of(candidate, its->frame, frames.reduction)) return start;
+  }
+  return std::nullopt;
+}
+
+// Where a bright and a dark side are seen and the candidate, if any, shows one of them: the survey of what differs from
+// the background, in which both sides are bright. It counts if it shows what both sides do.
+std::optional<Survey> survey_of_both_sides(const ChannelFrames& frames, const Survey& survey,
+                                           const SurveyOptions& options) {
+  const bool any_channel = frames.channels.size() > 1 || frames.channels.front().channel == Channel::automatic;
+  if (!any_channel || options.polarity == Polarity::dark_beads) return std::nullopt;
+  const std::optional<PackedStart> seen = both_sides_seen(survey, frames);
+  if (!seen) return std::nullopt;
+  const auto shows_them = [&](const Survey& one) {
+    return one.found && are_the_same(one.candidates.front().rims.radius_px, *seen->radius_px * frames.reduction);
+  };
+  if (shows_them(survey)) return std::nullopt;
+  const ChannelFrames distance{
+      frames.reduction, frames.width, frames.height, {{Channel::grey_distance, grey_distance_of(frames)}}};
+  Survey of_both = survey_of_all(distance, options, Effort::full, seen);
+  if (!shows_them(of_both)) return std::nullopt;
+  return of_both;
 }
 
 // In one part of the frames. `part`: px of the frames that were read.
@@ -713,7 +774,9 @@ std::optional<CalibrationResult> SearchedFrame::take(const GrayFrame& frame, con
 
 Survey take_survey(const ChannelFrames& frames, const SurveyOptions& options) {
   Survey survey = survey_of_all(frames, options, Effort::full);
-  if (survey.found || options.roi || frames.channels.empty()) return survey;
+  if (frames.channels.empty()) return survey;
+  if (std::optional<Survey> of_both = survey_of_both_sides(frames, survey, options)) return std::move(*of_both);
+  if (survey.found || options.roi) return survey;
   for (const PicturePart& part : parts_that_differ(frames.channels.front().frame)) {
     Survey there = survey_of_part(frames, part, options);
     if (there.found && there.candidates.front().disks.size() >= fewest_in_region) return there;

@@ -8,6 +8,7 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
+#include "ingest/frames/background_level.hpp"
 #include "ingest/frames/picture_threads.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/candidate_picture.hpp"
@@ -228,6 +229,7 @@ std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double 
 
 void look_for(const SurveyCandidate& best, FindOptions& find) {
   find.seen = BeadsSeen{best.rims.polarity, best.rims.radius_px, best.one_sided, best.no_faces, best.thorough};
+  find.distances = best.channel == Channel::grey_distance;
   if (!find.roi) find.roi = best.region;
 }
 
@@ -296,6 +298,7 @@ DisksFound find_disks(const ImageView& image, const FindOptions& options) {
     if (!survey.found) return out;
     look_for(survey.candidates.front(), find);
     region = survey.candidates.front().region;
+    if (survey.candidates.front().channel == Channel::grey_distance) frame = BackgroundLevel(frame).distance_of(frame);
   }
   CalibrationResult learned = learn_beads({&frame}, find);
   out.message = learned.why_not;
@@ -362,6 +365,7 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
       return refused(FindStatus::bad_input, formatted("frame %zu: %s", k, why));
   MeasureOptions measure = options;
   std::optional<PixelRectangle> region;
+  std::optional<BackgroundLevel> background;  // where the distance from it is searched
   if (!measure.find.seen) {
     GrayFrame first = frame_of(images.front());
     const Survey survey = survey_of(first, options.find);
@@ -369,9 +373,12 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
     look_for(survey.candidates.front(), measure.find);
     region = survey.candidates.front().region;
     if (const std::string why = scale_objection(measure); !why.empty()) return refused(FindStatus::bad_input, why);
+    if (survey.candidates.front().channel == Channel::grey_distance) background.emplace(first);
   }
-  FrameSource source =
-      FrameSource::from_generator(images.size(), [&](std::size_t index) { return frame_of(images[index]); });
+  FrameSource source = FrameSource::from_generator(images.size(), [&](std::size_t index) {
+    GrayFrame frame = frame_of(images[index]);
+    return background ? background->distance_of(frame) : std::move(frame);
+  });
   BedFound found = measured(source, std::move(measure));
   warn_of_part(region, found.measurement.warnings);
   return found;

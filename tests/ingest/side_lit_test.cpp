@@ -44,6 +44,7 @@ struct Look {
   double dark, background;            // grey levels of the dark side and of what is behind
   double walls = 0;                   // of walls and floor; 0: as what is behind
   double flatness = 1;                // height of the outline over its width
+  double uneven = 0;                  // light at the right less that at the left, of the mean
 };
 
 // Spheres by Lambert's law, four by four points a pixel, light noise.
@@ -83,8 +84,11 @@ GrayFrame drawn(const sim::Snapshot& bed, const Look& look, std::uint64_t seed) 
       }
   }
   RandomStream random(seed);
-  for (const double one : level)
-    frame.pixels.push_back(static_cast<float>(std::clamp(std::round(one + 2 * random.normal()), 0.0, 255.0)));
+  for (std::size_t at = 0; at < pixels; ++at) {
+    const double across = static_cast<double>(at % static_cast<std::size_t>(frame.width)) / frame.width - 0.5;
+    const double one = level[at] * (1 + look.uneven * across) + 2 * random.normal();
+    frame.pixels.push_back(static_cast<float>(std::clamp(std::round(one), 0.0, 255.0)));
+  }
   return frame;
 }
 
@@ -270,6 +274,88 @@ TEST(LitRim, OfOvalsIsNoCircle) {
   const auto rim = lit_rim_of(oval, parts_of(bed, oval, 16, -1.2, -1.4), Polarity::bright_beads);
   ASSERT_TRUE(rim);
   EXPECT_GT(rim->rms_radii, 0.012);
+}
+
+// One side brighter than the background, the other darker, and light that differs by a fifth from left to right.
+constexpr Look two_sides{16, 0.35, 0.7, 35, 100, 0, 1, 0.2};
+
+TEST(SpheresOfTwoSides, OfAGasAreFound) {
+  const sim::Snapshot bed = gas_of(110, 20, 4);
+  const BedFound found = measured(drawn(bed, two_sides, 8));
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.measurement.disk_total, bed.x.size());
+  EXPECT_NEAR(found.measurement.calibration.radius_px / two_sides.radius_px, 1, 0.03);
+}
+
+TEST(SpheresOfTwoSides, OfABedAreFound) {
+  const sim::Snapshot bed = bed_in_equilibrium(1, 6)[0];
+  const GrayFrame frame = drawn(bed, two_sides, 8);
+  const BedFound found = measured(frame);
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.measurement.disk_total, bed.x.size());
+  EXPECT_NEAR(3e-3 / found.measurement.calibration.scale_m_per_px / (2 * two_sides.radius_px), 1, 0.01);
+  const DisksFound disks = find_disks({frame.width, frame.height, frame.pixels.data(), PixelType::f32});
+  ASSERT_TRUE(disks.ok()) << disks.message;
+  EXPECT_EQ(disks.disks.size(), bed.x.size());
+}
+
+// Where the channel or the sign of the beads is given, it stays.
+TEST(SpheresOfTwoSides, AreSearchedInNoChannelThatWasNotAskedFor) {
+  const GrayFrame frame = drawn(gas_of(110, 20, 4), two_sides, 8);
+  const auto channel_of = [&](Channel channel, Polarity polarity) {
+    SurveyOptions options;
+    options.polarity = polarity;
+    const Survey survey = take_survey({1, frame.width, frame.height, {{channel, frame}}}, options);
+    return survey.found ? survey.candidates.front().channel : channel;
+  };
+  EXPECT_EQ(channel_of(Channel::automatic, Polarity::automatic), Channel::grey_distance);
+  EXPECT_EQ(channel_of(Channel::automatic, Polarity::dark_beads), Channel::automatic);
+  EXPECT_EQ(channel_of(Channel::red, Polarity::automatic), Channel::red);
+}
+
+// The line at which a sphere is as bright as the background is rounded off by its model: more may be unexplained there.
+TEST(SpheresOfTwoSides, MayLeaveMoreUnexplained) {
+  Packing packing;
+  packing.disks = 50, packing.unexplained = 0.006, packing.misfit = 1.3;
+  packing.lit = packing.distances = true;
+  packing.touching = 0.9;
+  EXPECT_TRUE(packing.describes());
+  packing.distances = false;
+  EXPECT_FALSE(packing.describes());
+  packing.distances = true, packing.touching = 0;
+  packing.unevenness = 0.004, packing.shown = 1, packing.noise = 0.02;
+  EXPECT_TRUE(packing.describes()) << "apart, and round";
+  packing.unevenness = 0.02;
+  EXPECT_FALSE(packing.describes()) << "apart, and not round";
+  packing.touching = 0.9, packing.lit = false;
+  EXPECT_FALSE(packing.describes()) << "even faces have no such line";
+}
+
+// From circles through the bright part, or through the dark part, to the whole sphere.
+TEST(RimOfBothSides, LeadsFromEitherSideToTheSphere) {
+  const sim::Snapshot bed = gas_of(110, 20, 4);
+  const GrayFrame frame = drawn(bed, two_sides, 8);
+  for (const double part : {-1.0, 0.5}) {
+    const auto rim = rim_of_both_sides(frame, parts_of(bed, frame, 16, 1.8 * part, 2.4 * part));
+    ASSERT_TRUE(rim) << part;
+    EXPECT_NEAR(rim->radius_px, 16, 0.5);
+    EXPECT_NEAR(rim->right_px, -1.8 * part, 0.4);
+    EXPECT_NEAR(rim->down_px, -2.4 * part, 0.4);
+    EXPECT_LT(rim->rms_radii, 0.02);
+    EXPECT_GT(rim->steep, 0.6);
+  }
+}
+
+TEST(RimOfBothSides, AsksForABrightAndADarkSide) {
+  const sim::Snapshot bed = gas_of(110, 20, 4);
+  for (const double background : {5.0, 30.0, 230.0}) {
+    const GrayFrame frame = drawn(bed, {16, 0.35, 0.7, 35, background}, 8);
+    EXPECT_FALSE(rim_of_both_sides(frame, parts_of(bed, frame, 16, -1.2, -1.6))) << background;
+  }
+  const GrayFrame frame = drawn(bed, two_sides, 8);
+  EXPECT_FALSE(rim_of_both_sides(frame, {}));
+  const sim::Snapshot elsewhere = gas_of(110, 20, 5);
+  EXPECT_FALSE(rim_of_both_sides(frame, parts_of(elsewhere, frame, 16, 0, 0))) << "no spheres are there";
 }
 
 // Under a low lamp most of the circles could be due to chance. Faces tell that they are beads, whether the radius is
