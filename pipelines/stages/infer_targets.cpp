@@ -14,9 +14,9 @@ namespace shakebed::pipelines {
 
 namespace {
 
-constexpr std::size_t most_target_heights = 60;  // of a profile: time grows with their third power
-constexpr double nothing = 0.01;                 // a profile that ends with less holds nothing above [1/D^2]
-constexpr double of_a_step = 1e-9;               // by which heights may miss the end of their range
+constexpr double most_target_heights = 60;  // of a profile: time grows with their third power
+constexpr double nothing = 0.01;            // a profile that ends with less holds nothing above [1/D^2]
+constexpr double of_a_step = 1e-9;          // by which heights may miss the end of their range
 
 const char* includes_scatter_help =
     "whether the standard error includes the scatter between beds with the same parameters, as that of a film or of a "
@@ -65,10 +65,12 @@ void describe_profile_target(Fields& f, ProfileTarget& profile) {
   f.require(profile.file.paths.size() <= 1, "file", "one profile is compared, but several files are named");
   f.require(profile.low < profile.high, "low", "\"low\" must be below \"high\"");
   if (!(profile.low < profile.high)) return;
-  f.require(profile.heights().size() <= most_target_heights, "spacing",
-            fmt::format("the profile is compared at {} heights at most, but these are {}", most_target_heights,
-                        profile.heights().size()),
-            "Give a larger \"spacing\", or a smaller range of heights");
+  // As many as heights() has: with a wrong unit their list would not fit into memory.
+  const double heights = std::floor((profile.high - profile.low) / profile.spacing + of_a_step) + 1;
+  f.require(
+      heights <= most_target_heights, "spacing",
+      fmt::format("the profile is compared at {} heights at most, but these are {}", most_target_heights, heights),
+      "Give a larger \"spacing\", or a smaller range of heights");
   const auto& from = f.from();
   f.require(profile.from.empty() ||
                 std::any_of(from.begin(), from.end(), [&](const StatedStage& one) { return one.id == profile.from; }),

@@ -305,6 +305,7 @@ TEST_F(InferMistakes, OfItsTargets) {
       profile({{"high", 61}}),
       "/stages/0/targets/profile/spacing: the profile is compared at 60 heights at most, but these are 61. Give a "
       "larger \"spacing\", or a smaller range of heights");
+  EXPECT_THAT(profile({{"high", 1e12}}), HasSubstr("60 heights at most, but these are 1000000000000. Give a larger"));
   EXPECT_EQ(profile({{"high", 1}}), "/stages/0/targets/profile/low: \"low\" must be below \"high\"");
   EXPECT_EQ(profile({{"file", {"p.csv", "q.csv"}}}),
             "/stages/0/targets/profile/file: one profile is compared, but several files are named");
