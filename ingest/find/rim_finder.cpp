@@ -157,7 +157,8 @@ LearnedRims learn_rims_at(PictureMaps& maps, const RimModel& start, Known known)
   LearnedRims learned;
   RimModel& model = learned.model;
   model = start;
-  const auto& [at, edges, copies] = maps.with_copies(model.radius_px);
+  const auto& [at, all_edges, copies] = maps.with_copies(model.radius_px);
+  const auto& edges = all_edges;  // a lambda may not name what a binding names
   const std::vector<const StretchedBand*> bands = bands_of(copies);
   model.threshold = edges.threshold;
   std::vector<Circle> circles;

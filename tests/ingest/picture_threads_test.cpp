@@ -50,18 +50,18 @@ TEST(PictureThreads, AreOneUnlessMoreAreAllowed) {
   EXPECT_EQ(threads_for(1000, 1000), 1);
 }
 
-struct GivenUp {};
+struct PictureGivenUp {};
 
 TEST(PictureThreads, AskTheQuestionOfTheirCaller) {
   const PictureThreads threads(2);
   std::atomic<int> asked = 0;
   const StopQuestion question([&] {
-    if (++asked == 3) throw GivenUp();
+    if (++asked == 3) throw PictureGivenUp();
   });
   std::atomic<int> done = 0;
   for_each_piece(2, [&](std::size_t) { StopQuestion::ask(), ++done; });
   EXPECT_EQ(done, 2);
-  EXPECT_THROW(for_each_piece(2, [&](std::size_t) { StopQuestion::ask(); }), GivenUp);
+  EXPECT_THROW(for_each_piece(2, [&](std::size_t) { StopQuestion::ask(); }), PictureGivenUp);
 }
 
 // Rims of a picture and of its copies, and the beads in the gaps between them.

@@ -1,0 +1,40 @@
+// Draws pictures of kinds that the tests of ingest draw: beds, beads of many looks, and things that are no beads.
+// usage: draw_pictures FOLDER NAME...
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ingest/frames/frames.hpp"
+#include "tests/ingest/drawn_beds.hpp"
+#include "tests/ingest/drawn_pictures.hpp"
+
+namespace {
+
+using namespace shakebed::ingest;
+
+// "bed-3" is the picture of the fourth kind.
+GrayFrame drawn(const std::string& name) {
+  const std::size_t dash = name.find('-'), kind = std::stoul(name.substr(dash + 1));
+  const std::string of = name.substr(0, dash);
+  std::mt19937 random(static_cast<std::mt19937::result_type>(60'000 + kind));
+  if (of == "bed") return test::drawn_beds().at(kind).draw(random).frame;
+  if (of == "look") return test::pictures_with_beads().at(kind).draw(random).frame;
+  if (of == "none") return test::pictures_without_beads().at(kind).draw(random);
+  throw std::invalid_argument(name + ": pictures are called bed-, look- or none- and a number");
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count < 2) {
+    std::cerr << "usage: draw_pictures FOLDER NAME...\n";
+    return EXIT_FAILURE;
+  }
+  const std::filesystem::path folder = arguments[1];
+  for (const std::string& name : std::vector<std::string>(arguments + 2, arguments + count))
+    write_png(folder / (name + ".png"), drawn(name));
+}
