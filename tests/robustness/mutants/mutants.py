@@ -65,6 +65,18 @@ OWN = {
     "ingest": ("test_ingest", "extract_numbers_test"),
     "pipelines": ("test_numbers", "extract_numbers_test", "test_pipelines"),  # the first two start no program
 }
+# Programs that the recorded results are made with, beside the command line; and the groups of results for each room.
+TOOLS = {
+    "draw_pictures": "tests/recorded/draw_pictures",
+    "say_mistakes": "tests/recorded/say_mistakes",
+}
+RECORDED = {
+    "statistics": ("beds", "tables"),
+    "sim": ("beds", "shipped"),
+    "fit": ("tables", "commands", "pictures"),
+    "ingest": ("pictures", "strangers"),
+    "pipelines": ("commands", "beds", "pictures", "tables", "mistakes", "shipped"),
+}
 # What is asked last of a fault that no other test has noticed: commands that end with 0, or with 77 where they are skipped.
 LAST = {
     "pipelines": (("house.reference", ("python3", "SOURCE/docs/write_reference.py", "PROGRAM", "--check")),
@@ -603,6 +615,10 @@ class Bench:
                     return "noticed", failed[0]
                 print(f"{failed[0]} fails without a fault: not used", flush=True)
                 tests = [test for test in tests if test not in self.unfit]
+        if part in ("first", "all"):
+            changed = self.changed_record(row["room"])
+            if changed:
+                return "noticed", changed
         if part == "first":
             return "not at first", ""
         for name, command in LAST.get(row["room"], ()):
@@ -611,6 +627,18 @@ class Bench:
             if code not in (0, 77):
                 return "noticed", name
         return "survived", ""
+
+
+    def changed_record(self, room):
+        """The first group of recorded results that a fault changes; "" where there is none."""
+        tools = self.work / "bin"
+        for group in RECORDED[room]:
+            code, _, cpu = run_limited(["python3", str(SOURCE / "tests/recorded/recorded.py"), "--tools", str(tools),
+                                        str(tools / "shakebed"), group], 900, cwd=tools)
+            self.cpu += cpu
+            if code != 0:
+                return f"recorded.{group}"
+        return ""
 
 
 def quick_filter(base, program):
@@ -739,7 +767,7 @@ def run(arguments):
     for bench in benches:
         bench.limit = arguments.limit
         bench.remembered = read_table(RESULTS) + rows
-        bench.prepare({**PROGRAMS, **LONG_PROGRAMS} if arguments.part == "long" else PROGRAMS)
+        bench.prepare({**PROGRAMS, **TOOLS, **(LONG_PROGRAMS if arguments.part == "long" else {})})
     times = {} if arguments.part == "long" else usual_times(benches[0])
 
     def work(bench):
