@@ -136,7 +136,7 @@ struct Bottom {
   double y, sine, cosine;
   std::size_t part;  // of the period
 };
-constexpr std::size_t parts = 12;  // of the period
+constexpr std::size_t parts_of_period = 12;  // of the period
 constexpr std::size_t fewest_bottoms = 30;
 constexpr double least_contact_tolerance = 0.02;  // D: what touching beads scatter
 // Of the step from this tolerance to none. In 40 simulated beds the floor was then off by 0.3 of the step (root mean
@@ -154,7 +154,7 @@ std::vector<Bottom> bottoms_by_phase(const std::vector<LowestBottoms>& frames, d
     const double phase = turns - std::floor(turns);
     for (const double y : frame.y)
       bottoms.push_back({y, std::sin(2 * std::numbers::pi * phase), std::cos(2 * std::numbers::pi * phase),
-                         std::min(parts - 1, static_cast<std::size_t>((phase + 1e-9) * parts))});
+                         std::min(parts_of_period - 1, static_cast<std::size_t>((phase + 1e-9) * parts_of_period))});
   }
   return bottoms;
 }
@@ -197,8 +197,8 @@ bool narrow_tolerance(const std::vector<Bottom>& bottoms, double tolerance, doub
 // The longest stretch of the period without a touching bead.
 std::size_t longest_stretch_without(const std::vector<std::size_t>& touching) {
   std::size_t longest = 0, empty = 0;
-  for (std::size_t k = 0; k < 2 * parts; ++k) {
-    empty = touching[k % parts] ? 0 : empty + 1;
+  for (std::size_t k = 0; k < 2 * parts_of_period; ++k) {
+    empty = touching[k % parts_of_period] ? 0 : empty + 1;
     longest = std::max(longest, empty);
   }
   return longest;
@@ -220,7 +220,7 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
   // Beads that come and go are as frequent at each small distance, so the floor is too high by the tolerance's share.
   const double narrow_middle = fit[0];
   for (std::size_t k = 0; k < fit.size(); ++k) fit[k] = 2 * fit[k] - wide[k];
-  std::vector<std::size_t> touching(parts, 0);
+  std::vector<std::size_t> touching(parts_of_period, 0);
   double squares = 0, twice_cosine = 0, twice_sine = 0;  // the latter of twice the phase
   for (const Bottom& bottom : bottoms) {
     const double gap = gap_above(fit, bottom);
@@ -239,7 +239,7 @@ FloorMotion find_floor_motion(const std::vector<LowestBottoms>& frames, double d
   const double turns = std::atan2(fit[2], fit[1]) / (2 * std::numbers::pi);
   motion.phase = turns - std::floor(turns);
   // Beyond half a period without a touching bead nothing bounds the fit there.
-  motion.known = longest_stretch_without(touching) <= parts / 2 &&
+  motion.known = longest_stretch_without(touching) <= parts_of_period / 2 &&
                  std::hypot(twice_cosine, twice_sine) <= at_opposite_phases * static_cast<double>(motion.touching);
   return motion;
 }
