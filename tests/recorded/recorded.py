@@ -12,7 +12,7 @@ GROUP is a folder of `runs`. Each file in it is a run:
   NAME.shipped    the shipped recipe NAME, its preset `quick`, with times of beds multiplied by the factor in this file
   NAME.mistakes   a recipe, whose options take wrong values, one after the other
   NAME.drawn      drawn pictures and the options of `fit-images` for them, one picture a line
-The record of a run, `records/GROUP/NAME.txt`, has one line for each number of its results, for each column of its tables,
+The record of a run, `records/GROUP/NAME.txt`, has one line for the numbers of each object, for each column of its tables,
 for each chart and page, and all that the program says. It does not say that a number is right, as the other tests do. It
 says that it has changed.
 """
@@ -31,7 +31,7 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 RELATIVE = 1e-6  # differences of numbers between machines and compilers are smaller, and those of faults larger
-ABSOLUTE = 1e-9  # the same, of the largest number of the line: a mean of nearly 0 is a difference of larger ones
+ABSOLUTE = 1e-9  # the same, of the largest of several means: a mean of nearly 0 is a difference of larger numbers
 NUMBER = re.compile(r"(?<![\w#.])[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?(?![\w.]*\w)", re.IGNORECASE)
 SHOWN = 30  # differing lines
 TIMES = {"settle", "measure", "ramp", "hold", "best_measure"}
@@ -80,20 +80,22 @@ def of_text(text):
 
 
 def of_json(document):
-    """One line for each number or list of numbers, and one for all words."""
+    """One line for the numbers of an object, one for each list of numbers, and one for all words."""
     words = []
 
     def numbers_of(value, place):
         if isinstance(value, dict):
+            own = [f"{key}={shown(value[key])}" for key in value if is_number(value[key])]
+            if own:
+                yield f"  {place} {' '.join(own)}"
             for key in value:
-                yield from numbers_of(value[key], f"{place}/{key}")
+                if not is_number(value[key]):
+                    yield from numbers_of(value[key], f"{place}/{key}")
         elif isinstance(value, list) and value and all(is_number(x) for x in value):
             yield f"  {place} {summary(value)}"
         elif isinstance(value, list):
             for k, element in enumerate(value):
                 yield from numbers_of(element, f"{place}/{k}")
-        elif is_number(value):
-            yield f"  {place} {shown(value)}"
         else:
             words.append(f"{place} {value}")
 
@@ -281,7 +283,7 @@ def same(old, new):
     if NUMBER.sub("#", old) != NUMBER.sub("#", new):
         return False
     pairs = [(float(a), float(b)) for a, b in zip(NUMBER.findall(old), NUMBER.findall(new))]
-    largest = max(max(abs(a), abs(b)) for a, b in pairs)
+    largest = 0 if "=" in old else max(max(abs(a), abs(b)) for a, b in pairs)  # numbers with names are no means
     return all(abs(a - b) <= RELATIVE * max(abs(a), abs(b)) + ABSOLUTE * largest for a, b in pairs)
 
 
