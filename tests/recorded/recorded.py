@@ -50,7 +50,7 @@ VARYING = [
     (re.compile(r"<script.*?</script>", re.DOTALL), "SCRIPT"),
     (re.compile(r"data:[\w/+-]+;base64,[\w+/=]+"), "DATA"),
     (re.compile(r"\b\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d)?Z?)?"), "DATE"),
-    (re.compile(r"\b[0-9a-f]{12,64}(-dirty)?\b"), "FINGERPRINT"),
+    (re.compile(r"(?<![.\w])[0-9a-f]{12,64}(-dirty)?(?![.\w])"), "FINGERPRINT"),
     (re.compile(r"(g\+\+|clang) [\d.]+"), "COMPILER"),
     (re.compile(r"<!-- times -->.*?<!-- /times -->"), "TIME"),
     (re.compile(r"^Time: .*$", re.MULTILINE), "TIME"),

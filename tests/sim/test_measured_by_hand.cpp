@@ -444,6 +444,8 @@ TEST(VelocitiesByHand, HaveTheFourthCumulantOfEachMoment) {
 // The unit is that of the first look, bins are 0.1 wide about multiples of it, and what is beyond lies in the last.
 TEST(VelocitiesByHand, AreFiledInBinsOfATenth) {
   VelocityObserver velocities(wide_box(7, true), {{0.5, 0.5}, {1, 1}}, 1, {0, 1, 3}, false);
+  EXPECT_EQ(velocities.histogram_x(0), 0) << "before the first look";
+  EXPECT_EQ(velocities.histogram_z(0), 0);
   Snapshot at;
   at.x = {1, 2}, at.z = {1, 1}, at.vx = {2, -2}, at.vz = {2, -2};
   velocities.observe(at, 0);
