@@ -40,6 +40,8 @@ constexpr double sigmas_of_aspect = 4, sigmas_of_radial = 5;
 constexpr double small_correction = 0.01;
 // Of a radius by votes, or by rims that blur has moved inwards.
 constexpr double radius_off = 0.07;
+constexpr double least_second_px =
+    1.5;  // radius of beads of a second kind: rims of smaller ones do not differ from noise
 
 std::vector<const GrayFrame*> pointers_to(const std::vector<GrayFrame>& frames) {
   std::vector<const GrayFrame*> pointers;
@@ -277,15 +279,6 @@ class FilmLearner {
     if (all_by_rims && lens_.plain()) film_.by_rims = FoundByRims{last_learned_from_, std::move(found)};
   }
 
-  // Radius that the second kind has in pixels if what was seen first is of the first kind.
-  [[nodiscard]] double second_radius() const {
-    return calibrated_.calibration.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
-  }
-  [[nodiscard]] bool may_show_second() const {
-    constexpr double least_px = 1.5;  // smaller ones have no rim that could be told from noise
-    return second_radius() >= least_px && why_not_in(straight_.back(), second_radius()).empty();
-  }
-
   // What was seen first may be of either kind, or of both.
   bool learn_both_kinds() {
     MeasureOptions& options = film_.options;
@@ -295,13 +288,17 @@ class FilmLearner {
     const bool first_is_large = ratio < 1;
     const BeadsSeen seen =
         find_.seen.value_or(BeadsSeen{calibrated_.calibration.polarity, calibrated_.calibration.rim_radius_px});
-    if (!may_show_second()) return false;
     KindsAsked asked;
     asked.ratio = first_is_large ? 1 / ratio : ratio;
     asked.polarity = seen.polarity;
     const double smallest = find_.radius_px ? *find_.radius_px * (first_is_large ? 1 : ratio) : seen.radius_px;
     asked.from_px = smallest / (1 + radius_off);
     asked.to_px = smallest * (find_.radius_px ? 1 : asked.ratio) * (1 + radius_off);
+    const GrayFrame& frame = straight_.back();
+    constexpr double widest = 0.45;  // of the frame's shorter side: the search goes a step beyond
+    asked.from_px = std::max(asked.from_px, least_second_px * asked.ratio);
+    asked.to_px = std::min(asked.to_px, widest * std::min(frame.width, frame.height));
+    if (asked.from_px > asked.to_px) return false;
     LearnedKinds learned = learn_two_kinds(pointers_to(straight_), asked, find_);
     kinds_why_not_ = std::move(learned.why_not);
     if (!learned.kinds) return false;
@@ -329,13 +326,14 @@ class FilmLearner {
 
   void learn_second() {
     const FinderCalibration& first = calibrated_.calibration;
-    if (!may_show_second()) {
+    const double radius = first.radius_px * *film_.options.second_diameter_m / film_.options.bead_diameter_m;
+    if (radius < least_second_px || !why_not_in(straight_.back(), radius).empty()) {
       char text[200];
-      std::snprintf(text, sizeof text, "they would be %.3g px wide in a frame of %d x %d px.", 2 * second_radius(),
-                    first.width, first.height);
+      std::snprintf(text, sizeof text, "they would be %.3g px wide in a frame of %d x %d px.", 2 * radius, first.width,
+                    first.height);
       return warn_of_no_second(text);
     }
-    film_.second = learn_second_by_rims(straight_.back(), second_radius(), first, film_.options);
+    film_.second = learn_second_by_rims(straight_.back(), radius, first, film_.options);
     if (!film_.second) warn_of_no_second("no rims of this radius were found.");
   }
 

@@ -145,9 +145,9 @@ class BedMeasurer {
     bins_.count = std::min(bins_.count, bins_up_to(options_.highest.value_or(highest_ + 1)));
     if (bins_.count == 0)
       throw std::invalid_argument(
-          formatted("measure_bed: the lowest height of the profile, %g D, lies above all beads, "
-                    "whose highest is at %.1f D: give a lower one",
-                    bins_.lowest, highest_));
+          formatted("the profile holds no height: its lowest is %g D, and its highest %.3g D. The highest bead is at "
+                    "%.1f D",
+                    bins_.lowest, options_.highest.value_or(highest_ + 1), highest_));
     if (cut_above_ > 0) end_below_upper_border();
     average_densities();
     if (coverage_) compare_coverage();
@@ -300,7 +300,7 @@ class BedMeasurer {
     const double count = std::max(1.0, std::ceil((top - bins_.lowest) / bins_.width - 1e-9));
     if (count > most_heights)
       throw std::invalid_argument(
-          formatted("measure_bed: the profile would have %.3g heights from %g to %g D, more than %g: choose a larger "
+          formatted("the profile would have %.0f heights from %g to %g D, more than %g: choose a larger "
                     "spacing, or lower its highest height",
                     count, bins_.lowest, top, most_heights));
     return static_cast<std::size_t>(count);
@@ -445,7 +445,8 @@ class BedMeasurer {
   }
 
   [[noreturn]] void refuse() const {
-    throw NoDisksError("the frames", "disks were found in none of the " + std::to_string(result_.frames.size()) + " frames",
+    throw NoDisksError("the frames",
+                       "disks were found in none of the " + std::to_string(result_.frames.size()) + " frames",
                        result_.frames.empty() ? "the stream is empty" : result_.frames.front().why,
                        "check that sharp beads, at least 10 px wide, are visible");
   }

@@ -278,6 +278,11 @@ std::string quantity_text(double value, const Dimension& dimension) {
   return unit.empty() ? number_text(value) : number_text(value) + " " + unit;
 }
 
+std::string per_cent(double relative) {
+  const double percent = 100 * relative;
+  return std::abs(percent) < 99.5 ? fmt::format("{:.2g} %", percent) : fmt::format("{:.0f} %", percent);
+}
+
 std::string handy_text(double value, const Dimension& d) {
   struct Handy {
     Dimension dimension;

@@ -63,6 +63,7 @@ double in_unit_of_result(const Quantity& quantity, const std::string& unit, std:
 std::string quantity_text(double value, const Dimension& dimension);
 // For people: "2.99 mm", "50 ms": six digits and a handy prefix.
 std::string handy_text(double value, const Dimension& dimension);
+std::string per_cent(double relative);  // two digits, or all before the point: "3.1 %", "55 %", "140 %"
 
 // How far two words are apart: insertions, deletions, replacements and swaps of neighbours.
 int edit_distance(std::string_view a, std::string_view b);

@@ -183,8 +183,6 @@ class Chooser {
 
 }  // namespace
 
-std::string per_cent(double relative) { return fmt::format("{:.2g} %", 100 * relative); }
-
 Budget parse_budget(const std::string& text) {
   const auto refuse = [&](const std::string& what) {
     throw UsageError(fmt::format(

@@ -26,7 +26,6 @@ struct Budget {
 };
 // "1 %", "30 s", "5 min". Throws UsageError.
 Budget parse_budget(const std::string& text);
-std::string per_cent(double relative);  // 0.0312: "3.1 %"
 
 // What was chosen, and what is expected of it.
 struct EffortChoice {

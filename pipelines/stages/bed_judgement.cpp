@@ -106,7 +106,7 @@ class Judge {
     object("contact duration too long",
            fmt::format("T may be too high by about {} or more, because the contact duration t_c makes {} of the "
                        "contacts elastic",
-                       percent_text(*effect), percent_text(number_at(joined_, "/elastic_share/value").value_or(0))),
+                       per_cent(*effect), per_cent(number_at(joined_, "/elastic_share/value").value_or(0))),
            "Give a shorter \"contact_duration\"; the warning proposes a value");
   }
 
@@ -161,11 +161,6 @@ class Judge {
 
 Json judgement_of(const SceneOptions& bed, const Json& joined, std::size_t beds) {
   return Judge(bed, joined, beds).run();
-}
-
-std::string percent_text(double share) {
-  const double percent = 100 * share;
-  return percent < 10 ? fmt::format("{:.2g} %", percent) : fmt::format("{:.0f} %", percent);
 }
 
 bool speaks_against(const Json& judgement) {

@@ -13,8 +13,6 @@ namespace shakebed::pipelines {
 // Of T: so much error by the contact duration is left without a word.
 inline constexpr double allowed_contact_effect = 0.02;
 
-std::string percent_text(double share);  // two digits: "2.4 %", "55 %", "100 %"
-
 // Of a shaken bed, for observables.json: {"verdict", "why", "advice"}, the gravest reason first. Verdicts: "rows lock",
 // "at rest", "contact duration too long", "still changing", "beds differ", "one bed", "real contacts may matter",
 // "holds". `joined` is what observables.json says of all beds.

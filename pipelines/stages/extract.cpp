@@ -126,10 +126,7 @@ void check(Fields& fields, const ExtractOptions& o) {
                  "one wall is missing: give both \"left_wall\" and \"right_wall\", or neither");
   if (o.left_wall && o.right_wall)
     fields.require(*o.left_wall < *o.right_wall, "left_wall", "the left wall must lie left of the right one");
-  fields.require(!o.highest || *o.highest > o.lowest.value_or(0) || (!o.lowest && o.floor_amplitude), "highest",
-                 fmt::format("the profile is to end at {:g} D, but it begins at {:g} D", o.highest.value_or(0),
-                             o.lowest.value_or(0)),
-                 "Give a \"highest\" above \"lowest\"");
+  if (o.lowest && o.highest) fields.require(*o.lowest < *o.highest, "highest", "\"highest\" must be above \"lowest\"");
   fields.require(!o.frequency || o.frame_rate, "frequency",
                  "the frequency is used for profiles by phase, which also need \"frame_rate\": give both, or leave "
                  "\"frequency\" out");
@@ -199,10 +196,10 @@ class Extract : public Stage {
 
   static void check_ratio(Fields& fields, double ratio) {
     constexpr double most = 20, rounding = 1e-9;
-    fields.require(
-        std::max(ratio, 1 / ratio) <= most * (1 + rounding), "second_diameter",
-        fmt::format("it is {:.3g} times the diameter; two kinds of beads are found up to a ratio of {:g}", ratio, most),
-        "Check its unit");
+    fields.require(std::max(ratio, 1 / ratio) <= most * (1 + rounding), "second_diameter",
+                   fmt::format("it is {:.3g} times the diameter; two kinds of beads are searched up to a ratio of {:g}",
+                               ratio, most),
+                   "Check its unit");
   }
 
   static constexpr double standard_gravity = 9.81;  // [m/s^2]

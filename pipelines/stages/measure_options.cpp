@@ -9,15 +9,10 @@
 #include "pipelines/stages/kernel_options.hpp"
 
 namespace shakebed::pipelines {
-namespace {
-
-// To four digits: what is advised is accepted.
 double rounded_up_to_four_digits(double value) {
   const double step = std::pow(10, std::floor(std::log10(value)) - 3);
   return std::ceil(value / step) * step;
 }
-
-}  // namespace
 
 void BedMeasureOptions::describe(Fields& fields) {
   fields.quantity("settle", settle_, dimension::time,

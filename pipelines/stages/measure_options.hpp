@@ -24,4 +24,7 @@ class BedMeasureOptions {
   sim::MeasureOptions measure_;       // all but the times
 };
 
+// For advice: what is advised is accepted.
+double rounded_up_to_four_digits(double value);
+
 }  // namespace shakebed::pipelines

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "pipelines/formats/bed.hpp"
 #include "pipelines/stages/images_module.hpp"
 
 namespace shakebed::pipelines {
 namespace {
+
+// Of a change of the light: with 1, one side of the frame gets none.
+constexpr Range some_light{.low = -1, .high = 1, .above_low = true, .below_high = true};
 
 class Render : public Stage {
  public:
@@ -32,9 +33,9 @@ class Render : public Stage {
                   {.help = "difference of the grey levels of centre and rim, relative to the contrast of the bead",
                    .range = from_to(-2, 2)});
     fields.number("gradient_x", o.gradient_x,
-                  {.help = "relative change of the light from left to right", .range = from_to(-1, 1)});
+                  {.help = "relative change of the light from left to right", .range = some_light});
     fields.number("gradient_y", o.gradient_y,
-                  {.help = "relative change of the light from top to bottom", .range = from_to(-1, 1)});
+                  {.help = "relative change of the light from top to bottom", .range = some_light});
     fields.number("vignette", o.vignette, {.help = "relative loss of light in the corners", .range = from_to(0, 0.9)});
     fields.integer("margin", o.margin,
                    {.help = "width of the margin around the box, in pixels", .range = from_to(0, 2000)});
@@ -42,9 +43,6 @@ class Render : public Stage {
                     {.help = "height of the view above the floor's mean position; default: up to the highest disk",
                      .range = positive});
     fields.integer("frames", o.frames, {.help = "largest number of frames that are drawn; 0: all"});
-    fields.require(std::abs(o.gradient_x) < 1 && std::abs(o.gradient_y) < 1,
-                   std::abs(o.gradient_x) < 1 ? "gradient_y" : "gradient_x",
-                   "with a change of 1 one side of the frame gets no light", "Give less than 1");
     fields.require(o.bead_level != o.background_level, "bead_level",
                    "beads cannot be seen, because \"bead_level\" equals \"background_level\"", "Choose another level");
     if (const KnownBed* known = fields.known_bed(); known != nullptr && !known->keeps_frames)

@@ -499,12 +499,13 @@ void SceneOptions::check_scene(Fields& fields) const {
                    "Give \"pressing\"");
     if (fields.problem_count() > 0) return;
   }
-  constexpr double longest_contact = 1;  // in this time a disk falls by its radius
+  constexpr double longest_contact = 1;  // of the unit of time
+  const auto [unit, meanwhile] =
+      gravity_ ? std::pair("sqrt(D/g)", "falls by its radius") : std::pair("D sqrt(m/T0)", "moves by its diameter");
   fields.require(
       contact_duration() <= longest_contact, "disks/contact_duration",
-      fmt::format("a contact would last {:.3g} sqrt(D/g), and in one sqrt(D/g) a disk falls by its radius",
-                  contact_duration()),
-      fmt::format("Leave it out, which means {:g} sqrt(D/g), or give a much shorter one", usual_contact_duration));
+      fmt::format("a contact would last {:.3g} {}, and in 1 {} a disk {}", contact_duration(), unit, unit, meanwhile),
+      fmt::format("Leave it out, which means {:g} {}, or give a much shorter one", usual_contact_duration, unit));
   const sim::Scene laid_out = scene(1);
   const std::vector<sim::SceneProblem> problems = sim::check(laid_out);
   // Lengths are in D here: a bead that is too large, as by a number without unit, makes the box too small.

@@ -200,7 +200,7 @@ void Simulate::check_heights(Fields& fields) {
   const auto heights = static_cast<double>(grid.points);
   fields.require(heights <= most_kept, "profile/spacing",
                  fmt::format("the profile would have {:.0f} heights, and a covariance of each pair", heights),
-                 fmt::format("Give {:.2g} or more", 1.005 * grid.spacing * heights / most_kept));
+                 fmt::format("Give {:.4g} or more", rounded_up_to_four_digits(grid.spacing * heights / most_kept)));
 }
 
 sim::MeasureOptions Simulate::measure_options() const {
@@ -360,10 +360,10 @@ void Simulate::warn_of_contact_duration(RunContext& context, const Json& results
       "the contact duration t_c = {} makes {} of the contacts elastic, so T may be about {} too high{}. This t_c is a "
       "numerical cut-off, not the time that a real contact lasts{}. "
       "\"contact_duration\": {} would reduce this to {} or less, with more contacts",
-      text(two_digits(now * unit)), percent_text(results.at("elastic_share").at("value").get<double>()),
-      percent_text(effect->get<double>()),
+      text(two_digits(now * unit)), per_cent(results.at("elastic_share").at("value").get<double>()),
+      per_cent(effect->get<double>()),
       effect->get<double>() > sim::ContactDurationEffect::known_up_to ? ", or much more" : "", contact_time_text(bed_),
-      text(shorter_than(wanted * unit, now * unit)), percent_text(allowed_contact_effect)));
+      text(shorter_than(wanted * unit, now * unit)), per_cent(allowed_contact_effect)));
 }
 
 // ------------------------------------------------------------------------------------------------ --budget

@@ -125,12 +125,17 @@ TEST(RenderedBed, EndsWhereItsViewIsTold) {
   EXPECT_EQ(geometry.floor, 65 - 0.5 - 10);
 }
 
-// At 0.2 m/s sqrt(2) a disk moves by 298 px, the sum of the frame's sides, in 0.2107 s.
-TEST(RenderedBed, HasNoStreaksLongerThanItsFrames) {
+// It goes right and up at sqrt(g D) = 0.2 m/s, in the middle of the box.
+TrajectoryFrame rising_disk(double height, double radius) {
   TrajectoryFrame frame;
   frame.width = 6.3;
-  frame.x = {3.15}, frame.z = {4}, frame.vx = {1}, frame.vz = {1}, frame.spin = {0}, frame.radius = {0.5};
-  BedOfCamera bed(bed_of_camera(), {frame});
+  frame.x = {3.15}, frame.z = {height}, frame.vx = {1}, frame.vz = {1}, frame.spin = {0}, frame.radius = {radius};
+  return frame;
+}
+
+// At 0.2 m/s sqrt(2) a disk moves by 298 px, the sum of the frame's sides, in 0.2107 s.
+TEST(RenderedBed, HasNoStreaksLongerThanItsFrames) {
+  BedOfCamera bed(bed_of_camera(), {rising_disk(4, 0.5)});
   RenderOptions options = plain_camera();
   options.exposure = 30;
   EXPECT_THAT([&] { render_frames(options, bed.stage); },
@@ -143,10 +148,7 @@ TEST(RenderedBed, HasNoStreaksLongerThanItsFrames) {
 // A disk that goes right and up at sqrt(g D) = 0.2 m/s moves by 12 px each way in 12 ms: a streak from lower left to
 // upper right, seen 7 px from its middle on that diagonal and not on the other.
 TEST(RenderedBed, HasStreaksOfMovingDisks) {
-  TrajectoryFrame frame;
-  frame.width = 6.3;
-  frame.x = {3.15}, frame.z = {3}, frame.vx = {1}, frame.vz = {1}, frame.spin = {0}, frame.radius = {0.3};
-  BedOfCamera bed(bed_of_camera(), {frame});
+  BedOfCamera bed(bed_of_camera(), {rising_disk(3, 0.3)});
   RenderOptions options = plain_camera();
   options.exposure = 0.012;
   render_frames(options, bed.stage);
@@ -282,9 +284,9 @@ TEST(ExtractedFrames, AreComparedWithTheNumberOfTheirBeads) {
 TEST(ExtractedFrames, HaveBeadsAtTheHeightsOfTheProfile) {
   RenderedFrames frames(bed_of_camera(), 1);
   frames.options.lowest = 6.5;  // the highest bead is at 5.4 D, and a profile ends 1 D above it
-  EXPECT_THAT(
-      [&] { frames.extracted(); },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("the lowest height of the profile, 6.5 D, lies above all beads")));
+  EXPECT_THAT([&] { frames.extracted(); },
+              ThrowsMessage<std::invalid_argument>(
+                  HasSubstr("the profile holds no height: its lowest is 6.5 D, and its highest 6.4")));
 }
 
 // A bed of 6.4 D.

@@ -182,32 +182,18 @@ def start(shakebed, words, folder):
 
 
 def shortened(value, factor):
-    """A recipe whose beds are simulated for shorter times."""
+    """A recipe whose beds are simulated for shorter times, in all its presets."""
     if isinstance(value, list):
         return [shortened(element, factor) for element in value]
     if not isinstance(value, dict):
         return value
-    return {key: times(element, factor) if key.split("~1")[-1] in TIMES else shortened(element, factor)
+    return {key: times(element, factor) if re.split("/|~1", key)[-1] in TIMES else shortened(element, factor)
             for key, element in value.items()}
 
 
 def times(duration, factor):
     number, _, unit = str(duration).partition(" ")
     return f"{float(number) * factor:g} {unit}" if unit else float(number) * factor
-
-
-def with_preset(recipe, name):
-    """The recipe after a preset: pointers to its values, and what they become."""
-    for pointer, value in recipe["presets"][name].items():
-        if pointer == "$comment":
-            continue
-        place = recipe
-        *parents, last = [part.replace("~1", "/").replace("~0", "~") for part in pointer.split("/")[1:]]
-        for part in parents:
-            place = place[int(part)] if isinstance(place, list) and part.isdigit() else \
-                next(x for x in place if x.get("id", x.get("stage")) == part) if isinstance(place, list) else place[part]
-        place[int(last) if isinstance(place, list) else last] = value
-    return recipe
 
 
 def options_of(schema, place=""):
@@ -251,9 +237,8 @@ def commands_of(tools, source, folder):
         return [f"run {source.name} --out out --jobs 1"]
     if source.suffix == ".shipped":
         recipe = json.loads((HERE / "../../pipelines/recipes" / source.stem / "figure.json").read_text())
-        recipe = shortened(with_preset(recipe, "quick"), float(source.read_text()))
-        (folder / "figure.json").write_text(json.dumps(recipe))
-        return ["run figure.json --out out --jobs 1"]
+        (folder / "figure.json").write_text(json.dumps(shortened(recipe, float(source.read_text()))))
+        return ["run figure.json --preset quick --out out --jobs 1"]
     if source.suffix == ".drawn":
         return drawn(tools / "draw_pictures", source, folder)
     return [line for line in source.read_text().splitlines() if line and not line.startswith("#")]
