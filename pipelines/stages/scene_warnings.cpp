@@ -149,7 +149,7 @@ void SceneOptions::warn_of_size(Fields& fields) const {
   if (gravity_ && lid != nullptr && lid->height < top)
     fields.warn("low lid", "/box/lid/height",
                 fmt::format("the lid is {} above the floor's mean position, but the bed at rest reaches {} when the "
-                            "floor is at its highest position. So the lid squeezes the bed",
+                            "floor is at its highest position. So the lid squeezes the bed, and the run may never end",
                             length_text(lid->height), length_text(top)),
                 "Raise the lid, or use fewer disks");
 }

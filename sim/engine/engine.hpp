@@ -65,6 +65,8 @@ inline constexpr double asserted_rounding = 1e-9;
 // Duration of the hop of a disk at rest on the floor: that of a contact, or this without a contact clock. A disk that
 // hopped for longer would be thrown [sqrt(D/g)].
 inline constexpr double rest_hop = 1e-4, longest_hop = 0.1;
+// With this share of the velocity of such a hop a disk parts from a floor that falls away.
+inline constexpr double parting = 1e-3;
 
 // In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
 enum class Order { of_time, of_tiles, of_the_rest };

@@ -29,11 +29,12 @@ void Engine<Space, Rule, Sizes>::hit_slope(std::uint32_t i, Motion& motion, bool
   const FloorMotion::Motion floor = floor_.motion(now_);
   bounce(i, motion, nx, nz, floor.velocity, side_surface_);
   floor_work_ += mass * (motion.vz() - vz) * floor.velocity;
-  // A disk that lies on the side is carried in small hops, as on the floor.
+  // A disk that lies on the side is carried in small hops, as on the floor, and leaves it alike.
   const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
-  const double slowest = 0.5 * (gravity_ + floor.acceleration) * slope_sine_ * hop;
+  const double pressing = gravity_ + floor.acceleration;
+  const double slowest = 0.5 * std::max(pressing, -parting * pressing) * slope_sine_ * hop;
   const double away = -(motion.vx() * nx + (motion.vz() - floor.velocity) * nz);
-  if (away < 1e-3 * slowest) {
+  if (away < 0.5 * slowest) {
     const TwoLanes before = motion.velocity;
     motion.velocity -= (slowest - away) * TwoLanes{nx, nz};
     const TwoLanes squares = motion.velocity * motion.velocity - before * before;

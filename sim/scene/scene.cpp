@@ -57,6 +57,12 @@ class Check {
     return INFINITY;
   }
 
+  double highest_floor() const {
+    if (const auto* sine = std::get_if<SinusoidalFloor>(&scene_.box.floor)) return sine->amplitude;
+    const auto* table = std::get_if<TabulatedFloor>(&scene_.box.floor);
+    return table == nullptr || table->heights.empty() ? 0 : *std::ranges::max_element(table->heights);
+  }
+
   void disks() {
     const Disks& d = scene_.disks;
     require(d.species.size() == 1 || d.species.size() == 2, "/disks",
@@ -152,9 +158,9 @@ class Check {
             "a box that is periodic upwards has no floor, so no motion of the floor can be given");
     double largest = 0;
     for (const Species& s : scene_.disks.species) largest = std::max(largest, s.diameter);
-    require(height() > amplitude + largest, "/box/lid",
+    require(height() > highest_floor() + largest, "/box/lid",
             "the lid at " + number(height()) + " D leaves no room for a disk above the floor, which rises to " +
-                number(amplitude) + " D");
+                number(highest_floor()) + " D");
   }
 
   void plates() {
@@ -205,15 +211,18 @@ class Check {
     }
   }
 
-  // Is there room for all the disks?
+  // Is there room for all the disks, also when the floor is at its highest position?
   void room() {
     if (std::isinf(height())) return;
+    const auto* lid = std::get_if<Lid>(&scene_.box.top);
+    const bool squeezed = lid != nullptr && !lid->is_free() && highest_floor() > 0;
     double area = 0;
     for (const Species& s : scene_.disks.species) area += s.count * std::numbers::pi / 4 * s.diameter * s.diameter;
-    const double fraction = area / (scene_.box.width * height());
+    const double fraction = area / (scene_.box.width * (height() - (squeezed ? highest_floor() : 0)));
     require(fraction <= std::numbers::pi / (2 * std::numbers::sqrt3), "/box",
-            "the disks would cover the fraction " + number(fraction) +
-                " of the box, but no packing of equal disks covers more than 0.9069. Give fewer disks or a larger box");
+            "the disks would cover the fraction " + number(fraction) + " of the box" +
+                (squeezed ? " when the floor is at its highest position" : "") +
+                ", but no packing of equal disks covers more than 0.9069. Give fewer disks or a larger box");
   }
 
   const Scene& scene_;

@@ -126,7 +126,8 @@ inline Outline irregular(std::mt19937& random, double radius, double roughness) 
   std::vector<std::complex<double>> waves;
   double power = 0;
   for (int k = 2; k <= 6; ++k) {
-    waves.push_back(std::polar(between(random, 0.3, 1) / std::sqrt(k - 1.0), between(random, 0, 2 * pi)));
+    const double phase = between(random, 0, 2 * pi), size = between(random, 0.3, 1) / std::sqrt(k - 1.0);
+    waves.push_back(std::polar(size, phase));
     power += 0.5 * std::norm(waves.back());
   }
   return star_shaped([&](double angle) {

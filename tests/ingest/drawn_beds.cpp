@@ -248,13 +248,15 @@ RadiusOf two_sizes(double large, double ratio, double share) {
 
 DrawnBed bed_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px) {
   Scene scene = some_scene(random);
-  scene.face = fringed(uniform(random, 60, 90), uniform(random, 0, 25));
+  const double depth = uniform(random, 0, 25), level = uniform(random, 60, 90);
+  scene.face = fringed(level, depth);
   return photographed(random, scene, pile(random, scene, two_sizes(large_radius_px, ratio, share_of_small)));
 }
 
 DrawnBed strewn_of_two_sizes(std::mt19937& random, double ratio, double share_of_small, double large_radius_px) {
   Scene scene = some_scene(random);
-  scene.face = fringed(uniform(random, 60, 90), uniform(random, 0, 25));
+  const double depth = uniform(random, 0, 25), level = uniform(random, 60, 90);
+  scene.face = fringed(level, depth);
   const RadiusOf radius_of = two_sizes(large_radius_px, ratio, share_of_small);
   return photographed(random, scene, strewn(random, scene, radius_of, 1.03, 150));
 }
@@ -374,19 +376,22 @@ const std::vector<BedKind>& drawn_beds() {
       {"strewn, fringes",
        [](Random& r) {
          Scene s = some_scene(r);
-         s.face = fringed(uniform(r, 80, 120), uniform(r, 30, 90));
+         const double depth = uniform(r, 30, 90), level = uniform(r, 80, 120);
+         s.face = fringed(level, depth);
          return photographed(r, s, strewn(r, s, one_size(r), 1.05, 90));
        }},
       {"a pile, fringes",
        [](Random& r) {
          Scene s = some_scene(r);
-         s.face = fringed(uniform(r, 80, 120), uniform(r, 30, 90));
+         const double depth = uniform(r, 30, 90), level = uniform(r, 80, 120);
+         s.face = fringed(level, depth);
          return photographed(r, s, pile(r, s, one_size(r)));
        }},
       {"packed beyond the frame, fringes",
        [](Random& r) {
          Scene s = some_scene(r);
-         s.face = fringed(uniform(r, 80, 120), uniform(r, 30, 90));
+         const double depth = uniform(r, 30, 90), level = uniform(r, 80, 120);
+         s.face = fringed(level, depth);
          return photographed(r, s, packed_beyond(r, s, one_size(r)));
        }},
       {"strewn, poor contrast",
@@ -421,7 +426,8 @@ const std::vector<BedKind>& drawn_beds() {
        [](Random& r) {
          Scene s = some_scene(r);
          s.shadow = uniform(r, 0.1, 0.3);
-         s.face = clear_disks(uniform(r, 110, 140), uniform(r, 10, 40), uniform(r, 20, 60));
+         const double line = uniform(r, 20, 60), spread = uniform(r, 10, 40), level = uniform(r, 110, 140);
+         s.face = clear_disks(level, spread, line);
          return photographed(r, s, packed_beyond(r, s, one_size(r)));
        }},
       {"a pile of balls lit from above",
@@ -437,28 +443,33 @@ const std::vector<BedKind>& drawn_beds() {
       {"a pile of two sizes",
        [](Random& r) {
          Scene s = some_scene(r);
-         s.face = fringed(uniform(r, 60, 100), uniform(r, 0, 30));
-         return photographed(r, s, pile(r, s, two_sizes(uniform(r, 14, 22), uniform(r, 1.2, 2), uniform(r, 0.1, 0.9))));
+         const double depth = uniform(r, 0, 30), level = uniform(r, 60, 100);
+         s.face = fringed(level, depth);
+         const double share = uniform(r, 0.1, 0.9), ratio = uniform(r, 1.2, 2), large = uniform(r, 14, 22);
+         return photographed(r, s, pile(r, s, two_sizes(large, ratio, share)));
        }},
       {"two sizes, packed beyond the frame, fringes",
        [](Random& r) {
          Scene s = some_scene(r);
-         s.face = fringed(uniform(r, 80, 110), uniform(r, 30, 70));
-         return photographed(
-             r, s, packed_beyond(r, s, two_sizes(uniform(r, 14, 22), uniform(r, 1.2, 1.8), uniform(r, 0.2, 0.8))));
+         const double depth = uniform(r, 30, 70), level = uniform(r, 80, 110);
+         s.face = fringed(level, depth);
+         const double share = uniform(r, 0.2, 0.8), ratio = uniform(r, 1.2, 1.8), large = uniform(r, 14, 22);
+         return photographed(r, s, packed_beyond(r, s, two_sizes(large, ratio, share)));
        }},
       {"two sizes, clear disks with shadows",
        [](Random& r) {
          Scene s = some_scene(r);
          s.shadow = uniform(r, 0.1, 0.3);
-         s.face = clear_disks(uniform(r, 110, 140), uniform(r, 10, 40), uniform(r, 20, 60));
-         return photographed(
-             r, s, packed_beyond(r, s, two_sizes(uniform(r, 14, 22), uniform(r, 1.25, 1.6), uniform(r, 0.2, 0.8))));
+         const double line = uniform(r, 20, 60), spread = uniform(r, 10, 40), level = uniform(r, 110, 140);
+         s.face = clear_disks(level, spread, line);
+         const double share = uniform(r, 0.2, 0.8), ratio = uniform(r, 1.25, 1.6), large = uniform(r, 14, 22);
+         return photographed(r, s, packed_beyond(r, s, two_sizes(large, ratio, share)));
        }},
       {"a spread of sizes",
        [](Random& r) {
          Scene s = some_scene(r);
-         s.face = fringed(uniform(r, 60, 100), uniform(r, 0, 40));
+         const double depth = uniform(r, 0, 40), level = uniform(r, 60, 100);
+         s.face = fringed(level, depth);
          const double middle = uniform(r, 11, 17), spread = uniform(r, 0.03, 0.2);
          return photographed(
              r, s, pile(r, s, [=](Random& q) { return middle * std::clamp(1 + spread * gaussian(q), 0.6, 1.5); }));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -71,6 +72,11 @@ Outline some_oval(std::mt19937& random) {
   return oval(a, a / between(random, 1.25, 2.4));
 }
 double some_size(std::mt19937& random) { return between(random, 7, 20); }
+
+GrayFrame many_somehow(std::mt19937& random, const std::function<Outline()>& outline) {
+  const bool turned_alike = coin(random), on_lattice = coin(random);
+  return many_of(random, outline(), on_lattice, turned_alike);
+}
 
 // Noise with a power spectrum that falls as k^-exponent, or within a band of wavelengths; mean 0, rms 1.
 cv::Mat coloured_noise(std::mt19937& random, double exponent, double shortest_px, double longest_px) {
@@ -467,37 +473,40 @@ const std::vector<DrawnKind>& pictures_without_beads() {
       {"rectangles",
        [](Random& r) {
          const double a = some_size(r);
-         return many_of(r, box(a, a / between(r, 1.3, 2.5)), coin(r), coin(r));
+         return many_somehow(r, [&] { return box(a, a / between(r, 1.3, 2.5)); });
        }},
       {"triangles on a lattice", [](Random& r) { return many_of(r, polygon(3, 1.3 * some_size(r)), true, true); }},
       {"triangles at random", [](Random& r) { return many_of(r, polygon(3, 1.3 * some_size(r)), false, false); }},
-      {"pentagons", [](Random& r) { return many_of(r, polygon(5, some_size(r)), coin(r), coin(r)); }},
-      {"hexagons", [](Random& r) { return many_of(r, polygon(6, some_size(r)), coin(r), coin(r)); }},
+      {"pentagons", [](Random& r) { return many_somehow(r, [&] { return polygon(5, some_size(r)); }); }},
+      {"hexagons", [](Random& r) { return many_somehow(r, [&] { return polygon(6, some_size(r)); }); }},
       {"a honeycomb", honeycomb},
-      {"half disks", [](Random& r) { return many_of(r, half_disk(1.2 * some_size(r)), coin(r), coin(r)); }},
-      {"crescents", [](Random& r) { return many_of(r, crescent(1.2 * some_size(r)), coin(r), coin(r)); }},
+      {"half disks", [](Random& r) { return many_somehow(r, [&] { return half_disk(1.2 * some_size(r)); }); }},
+      {"crescents", [](Random& r) { return many_somehow(r, [&] { return crescent(1.2 * some_size(r)); }); }},
       {"crosses",
        [](Random& r) {
          const double a = 1.2 * some_size(r);
-         return many_of(r, cross(a, a * between(r, 0.2, 0.5)), coin(r), coin(r));
+         return many_somehow(r, [&] { return cross(a, a * between(r, 0.2, 0.5)); });
        }},
       {"stars",
        [](Random& r) {
          const double a = 1.2 * some_size(r);
-         return many_of(r, star(4 + static_cast<int>(r() % 4), a, a * between(r, 0.4, 0.6)), coin(r), coin(r));
+         return many_somehow(r, [&] {
+           const double inner = a * between(r, 0.4, 0.6);
+           return star(4 + static_cast<int>(r() % 4), a, inner);
+         });
        }},
       {"rods with round ends",
        [](Random& r) {
          const double a = between(r, 4, 10);
-         return many_of(r, capsule(a * between(r, 0.6, 3), a), coin(r), coin(r));
+         return many_somehow(r, [&] { return capsule(a * between(r, 0.6, 3), a); });
        }},
       {"leaves",
        [](Random& r) {
          const double a = between(r, 12, 26);
-         return many_of(r, leaf(a, a * between(r, 0.3, 0.6)), coin(r), coin(r));
+         return many_somehow(r, [&] { return leaf(a, a * between(r, 0.3, 0.6)); });
        }},
       {"voids between disks",
-       [](Random& r) { return many_of(r, void_of_three(between(r, 12, 40)), coin(r), coin(r)); }},
+       [](Random& r) { return many_somehow(r, [&] { return void_of_three(between(r, 12, 40)); }); }},
       {"rings that are ovals",
        [](Random& r) {
          const double a = between(r, 10, 24), b = a / between(r, 1.3, 2);
@@ -518,7 +527,12 @@ const std::vector<DrawnKind>& pictures_without_beads() {
          return canvas.seen(r);
        }},
       {"one irregular shape many times",
-       [](Random& r) { return many_of(r, irregular(r, some_size(r), between(r, 0.12, 0.25)), coin(r), coin(r)); }},
+       [](Random& r) {
+         return many_somehow(r, [&] {
+           const double rough = between(r, 0.12, 0.25), size = some_size(r);
+           return irregular(r, size, rough);
+         });
+       }},
       {"splinters", mixed_polygons},
       {"long worms", [](Random& r) { return worms(r, 12, 300, 0.03); }},
       {"short worms", [](Random& r) { return worms(r, 60, 50, 0.06); }},
@@ -540,11 +554,14 @@ const std::vector<DrawnKind>& pictures_without_beads() {
          return canvas.seen(r);
        }},
       {"islands",
-       [](Random& r) { return cut_at(r, coloured_noise(r, between(r, 2, 3), 4, 1e6), between(r, -0.5, 1)); }},
+       [](Random& r) {
+         const double threshold = between(r, -0.5, 1);
+         return cut_at(r, coloured_noise(r, between(r, 2, 3), 4, 1e6), threshold);
+       }},
       {"a labyrinth",
        [](Random& r) {
-         const double wave = between(r, 14, 50);
-         return cut_at(r, coloured_noise(r, 0, wave, 1.4 * wave), between(r, -0.4, 0.4));
+         const double wave = between(r, 14, 50), threshold = between(r, -0.4, 0.4);
+         return cut_at(r, coloured_noise(r, 0, wave, 1.4 * wave), threshold);
        }},
       {"a relief map",
        [](Random& r) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 #include <random>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,11 +17,14 @@ namespace {
 
 using namespace shakebed::ingest;
 
-// "bed-3" is the picture of the fourth kind.
+// "bed-3" is a picture of the fourth kind, and "bed-3-2" another one.
 GrayFrame drawn(const std::string& name) {
-  const std::size_t dash = name.find('-'), kind = std::stoul(name.substr(dash + 1));
-  const std::string of = name.substr(0, dash);
-  std::mt19937 random(static_cast<std::mt19937::result_type>(60'000 + kind));
+  std::istringstream words(name);
+  std::string of;
+  std::size_t kind = 0;
+  long which = 0;  // the dash before it makes it negative
+  std::getline(words, of, '-') >> kind >> which;
+  std::mt19937 random(static_cast<std::mt19937::result_type>(60'000 - 1'000 * which + static_cast<long>(kind)));
   if (of == "bed") return test::drawn_beds().at(kind).draw(random).frame;
   if (of == "look") return test::pictures_with_beads().at(kind).draw(random).frame;
   if (of == "none") return test::pictures_without_beads().at(kind).draw(random);

@@ -11,9 +11,10 @@ GROUP is a folder of `runs`. Each file in it is a run:
   NAME.commands   commands, one a line
   NAME.shipped    the shipped recipe NAME, its preset `quick`, with times of beds multiplied by the factor in this file
   NAME.mistakes   a recipe, whose options take wrong values, one after the other
+  NAME.options    names of recipes of other groups, whose options take other values, one after the other
   NAME.drawn      drawn pictures and the options of `fit-images` for them, one picture a line
 The record of a run, `records/GROUP/NAME.txt`, has one line for the numbers of each object, for each column of its tables,
-for each chart and page, and all that the program says. It does not say that a number is right, as the other tests do. It
+for each chart and page, and all that the program says. Of options that take other values there is one line for each. It does not say that a number is right, as the other tests do. It
 says that it has changed.
 """
 import argparse
@@ -39,6 +40,7 @@ ABSOLUTE = 1e-9  # the same, of the largest of several means: a mean of nearly 0
 NUMBER = re.compile(r"(?<![\w#.])[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?(?![\w.]*\w)", re.IGNORECASE)
 SHOWN = 30  # differing lines
 TIMES = {"settle", "measure", "ramp", "hold", "best_measure"}
+REFUSED = 3  # exit code of a recipe that cannot be run
 WRONG = ["-1", "1e12", "text"]  # values of options, each wrong for most of them
 
 # Written by the clock, the machine, or the revision.
@@ -139,8 +141,12 @@ def of_disks(text):
             yield f"  column {k} {summary(values)}"
 
 
+def is_recorded(path):
+    return path.is_file() and path.name not in NOT_RECORDED and path.suffix in TEXTS | {".json", ".csv", ".extxyz"}
+
+
 def of_file(path, name):
-    if path.name in NOT_RECORDED or path.suffix not in TEXTS | {".json", ".csv", ".extxyz"}:
+    if not is_recorded(path):
         return
     yield name
     if path.suffix == ".json" and path.name not in AS_TEXT and not path.name.endswith("-metadata.json"):
@@ -196,11 +202,15 @@ def times(duration, factor):
     return f"{float(number) * factor:g} {unit}" if unit else float(number) * factor
 
 
+def parts_of(option):
+    return [option, *option.get("anyOf", []), *option.get("oneOf", [])]
+
+
 def options_of(schema, place=""):
-    """Pointers to all options below a part of the schema."""
+    """Pointers to all options below a part of the schema, and what it says of them."""
     for name, option in schema.get("properties", {}).items():
-        yield f"{place}/{name}"
-        for part in (option, *option.get("anyOf", []), *option.get("oneOf", [])):
+        yield f"{place}/{name}", option
+        for part in parts_of(option):
             yield from options_of(part, f"{place}/{name}")
 
 
@@ -220,7 +230,7 @@ def mistakes(shakebed, say, source, folder):
     (folder / "recipe.json").write_text(source.read_text())
     changes, tried = ["/name=options"], set()
     for stage in json.loads(source.read_text())["stages"]:
-        options = [option for option in options_of(schema_of(schema, stage)) if option not in tried]
+        options = [option for option, _ in options_of(schema_of(schema, stage)) if option not in tried]
         changes += [f"/stages/{stage.get('id', stage['stage'])}{option}={value}"
                     for option in dict.fromkeys(options) for value in WRONG]
         tried.update(options)
@@ -229,6 +239,69 @@ def mistakes(shakebed, say, source, folder):
     lines = done.stdout.splitlines()
     of_recipe = set(lines[1:lines.index(f"# {changes[1]}")])
     yield from (line for k, line in enumerate(lines) if line not in of_recipe or k <= len(of_recipe))
+
+
+def quantity(value):
+    """Number and unit, or nothing."""
+    found = re.fullmatch(r"([-+]?[\d.]+(?:e[-+]?\d+)?)(| \S+)", str(value))
+    return found and (float(found[1]), found[2])
+
+
+def other_values(option, value):
+    """All words, both answers, the limits of a number, and two numbers around a known one."""
+    parts = parts_of(option)
+    words = [word for part in parts for word in part.get("enum", [])]
+    kinds = {part.get("type") for part in parts}
+    if words or "boolean" in kinds:
+        return [word for word in words or ["true", "false"] if word != value]
+    if not kinds & {"integer", "number"}:
+        return []
+    known = (quantity(x) for x in (value, option.get("default"), *option.get("examples", [])))
+    number, unit = next(filter(None, known), (1, ""))
+    around = [number * 0.8, number * 1.3] if number else [0.3, 2]
+    if "number" not in kinds:
+        around = [math.floor(around[0]), math.ceil(around[1])]
+    limits = (part[limit] for part in parts for limit in ("minimum", "maximum") if limit in part)
+    near = [limit for limit in limits if abs(limit) <= 10 * abs(around[1])]
+    return [f"{x:g}{unit}" for x in dict.fromkeys([*around, *near])]
+
+
+def value_at(stage, place):
+    for name in place.split("/")[1:]:
+        stage = stage.get(name) if isinstance(stage, dict) else None
+    return stage
+
+
+def other_options(shakebed, source, folder):
+    """One line for each value that is accepted: exit code, messages, and all words and numbers that the stage writes."""
+    schema = json.loads(start(shakebed, ["schema"], folder).stdout)
+    tried = set()
+    for name in source.read_text().split():
+        recipe = folder / f"{pathlib.Path(name).name}.json"
+        shutil.copy(HERE / "runs" / f"{name}.json", recipe)
+        run = ["run", recipe.name, "--out", recipe.stem, "--jobs", "1", "--quiet"]
+        start(shakebed, run, folder)
+        for stage in json.loads(recipe.read_text())["stages"]:
+            kind, id_ = stage["stage"], stage.get("id", stage["stage"])
+            for place, option in options_of(schema_of(schema, stage)):
+                value = value_at(stage, place)
+                for other in other_values(option, value) if value is not None or (kind, place) not in tried else []:
+                    tried.add((kind, place))
+                    done = start(shakebed, [*run, "--only", id_, "--set", f"/stages/{id_}{place}={other}"], folder)
+                    if done.returncode != REFUSED:
+                        texts = [*said(done, folder), *texts_of(folder / recipe.stem / id_)]
+                        yield f"{id_}{place}={other}: exit code {done.returncode}, {of_texts(texts)}"
+
+
+def texts_of(folder):
+    return (path.read_text() for path in sorted(folder.rglob("*")) if is_recorded(path))
+
+
+def of_texts(texts):
+    """All words, and means of the logarithms of numbers, in which none outweighs all others."""
+    texts = [without_varying(text) for text in texts]
+    numbers = [math.asinh(float(number) / 1e-6) for text in texts for number in NUMBER.findall(text)]
+    return f"words {digest(' '.join(NUMBER.sub('#', text) for text in texts))}, numbers {summary(numbers)}"
 
 
 def commands_of(tools, source, folder):
@@ -257,6 +330,9 @@ def of_run(shakebed, tools, source, folder):
         shutil.copy(file, folder)
     if source.suffix == ".mistakes":
         yield from mistakes(shakebed, tools / "say_mistakes", source, folder)
+        return
+    if source.suffix == ".options":
+        yield from other_options(shakebed, source, folder)
         return
     for command in commands_of(tools, source, folder):
         done = start(shakebed, command.split(), folder)

@@ -70,10 +70,11 @@ TEST(SceneCheck, RefusesWhatCannotBe) {
 TEST(SceneCheck, LeavesRoomAboveTheHighestFloor) {
   Scene s = bed(3, 30);
   s.box.floor = TabulatedFloor{2, {0, 0.3, 0, -0.4}};
-  s.box.top = Lid{1.41, {}};
+  s.box.top = Lid{1.31, {}};
   EXPECT_EQ(first_problem(s), "");
-  s.box.top = Lid{1.39, {}};
+  s.box.top = Lid{1.29, {}};
   EXPECT_EQ(first_problem(s), "/box/lid");
+  s.box.top = Lid{1.39, {}};
   s.box.floor = SinusoidalFloor{0.4, 0.35};
   EXPECT_EQ(first_problem(s), "/box/lid");
   s.box.top = Lid{1.41, {}};
@@ -85,6 +86,24 @@ TEST(SceneCheck, RefusesMoreDisksThanTheBoxHolds) {
   s.box.floor = StillFloor{};
   s.box.top = Lid{10, {}};
   EXPECT_EQ(first_problem(s), "/box");
+}
+
+// 80 disks cover 62.8 D^2, which is 0.9069 of 69.3 D^2: a box of 10 D below a lid at 8 D holds them while its floor
+// rises by less than 1.07 D. Below a lid that gives way it holds them in any case.
+TEST(SceneCheck, RefusesAFloorThatLeavesTooLittleRoomBelowTheLid) {
+  Scene s = bed(80, 10);
+  s.box.top = Lid{8, {}};
+  s.box.floor = SinusoidalFloor{1.06, 0.35};
+  EXPECT_EQ(first_problem(s), "");
+  s.box.floor = SinusoidalFloor{1.08, 0.35};
+  EXPECT_EQ(first_problem(s), "/box");
+  s.box.floor = TabulatedFloor{2, {0, 1.08, 0, -1}};
+  EXPECT_EQ(first_problem(s), "/box");
+  s.box.floor = TabulatedFloor{2, {0, 1, 0, -1.08}};
+  EXPECT_EQ(first_problem(s), "");
+  s.box.floor = SinusoidalFloor{1.08, 0.35};
+  s.box.top = Lid{8, {}, 20};
+  EXPECT_EQ(first_problem(s), "");
 }
 
 TEST(Start, RefusesOverlappingDisksWithTheNumbers) {
