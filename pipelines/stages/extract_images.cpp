@@ -59,7 +59,7 @@ void require_visible(std::uint64_t reduction, double radius_px, const std::strin
   const double left = radius_px / static_cast<double>(reduction);
   if (left >= ingest::least_reduced_radius_px) return;
   throw StageError(fmt::format(
-      "{}: averaged over squares of {} px (reduction), a bead of {:.3g} px radius is left with {:.2g} px; {:g} px are "
+      "{}: averaged over squares of {} px (reduction), a bead of {:.3g} px radius is left with {:.3g} px; {:g} px are "
       "needed. Give at most {}",
       path, reduction, radius_px, left, ingest::least_reduced_radius_px,
       std::max(1, static_cast<int>(radius_px / ingest::least_reduced_radius_px))));

@@ -203,12 +203,12 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   bounce(i, motion, 0, -1, floor.velocity, floor_surface_);
   floor_work_ += mass * (motion.vz() - vz_before) * floor.velocity;
   // A disk that lies still on the floor is carried in small hops: a contact has
-  // to end before the next can begin. Much smaller hops would cost as many more contacts. A disk that the floor leaves
-  // parts from it: after a plastic contact rounding alone would decide whether they touch.
+  // to end before the next can begin. A disk that the floor leaves parts from it: after a plastic contact rounding
+  // alone would decide whether they touch.
   const double pressing = gravity_ + floor.acceleration;
   const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
   const double slowest = 0.5 * std::max(pressing, -parting * pressing) * hop;
-  if (motion.vz() - floor.velocity < 0.5 * slowest) {
+  if (motion.vz() - floor.velocity < 1e-3 * slowest) {
     const double slow = motion.vz();
     motion.velocity[1] = floor.velocity + slowest;
     floor_work_ += 0.5 * mass * (motion.vz() - slow) * (motion.vz() + slow);

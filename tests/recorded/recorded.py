@@ -14,8 +14,8 @@ GROUP is a folder of `runs`. Each file in it is a run:
   NAME.options    names of recipes of other groups, whose options take other values, one after the other
   NAME.drawn      drawn pictures and the options of `fit-images` for them, one picture a line
 The record of a run, `records/GROUP/NAME.txt`, has one line for the numbers of each object, for each column of its tables,
-for each chart and page, and all that the program says. Of options that take other values there is one line for each. It does not say that a number is right, as the other tests do. It
-says that it has changed.
+for each chart and page, and all that the program says. Options that take other values have two lines each. It does not
+say that a number is right, as the other tests do. It says that it has changed.
 """
 import argparse
 import csv
@@ -273,7 +273,7 @@ def value_at(stage, place):
 
 
 def other_options(shakebed, source, folder):
-    """One line for each value that is accepted: exit code, messages, and all words and numbers that the stage writes."""
+    """Of each value that is accepted all words and numbers that the stage writes; the exit code, and what is said."""
     schema = json.loads(start(shakebed, ["schema"], folder).stdout)
     tried = set()
     for name in source.read_text().split():
@@ -282,15 +282,22 @@ def other_options(shakebed, source, folder):
         run = ["run", recipe.name, "--out", recipe.stem, "--jobs", "1", "--quiet"]
         start(shakebed, run, folder)
         for stage in json.loads(recipe.read_text())["stages"]:
-            kind, id_ = stage["stage"], stage.get("id", stage["stage"])
-            for place, option in options_of(schema_of(schema, stage)):
-                value = value_at(stage, place)
-                for other in other_values(option, value) if value is not None or (kind, place) not in tried else []:
-                    tried.add((kind, place))
-                    done = start(shakebed, [*run, "--only", id_, "--set", f"/stages/{id_}{place}={other}"], folder)
-                    if done.returncode != REFUSED:
-                        texts = [*said(done, folder), *texts_of(folder / recipe.stem / id_)]
-                        yield f"{id_}{place}={other}: exit code {done.returncode}, {of_texts(texts)}"
+            id_ = stage.get("id", stage["stage"])
+            for change in changes_of(stage, schema_of(schema, stage), tried):
+                done = start(shakebed, [*run, "--only", id_, "--set", f"/stages/{id_}{change}"], folder)
+                if done.returncode == 0:
+                    yield f"{id_}{change}: {of_texts(texts_of(folder / recipe.stem / id_))}"
+                if done.returncode != REFUSED:
+                    yield f"> {done.returncode} {of_texts(said(done, folder))}"
+
+
+def changes_of(stage, schema, tried):
+    """Options that the stage gives take other values, and those that no stage of its kind has tried before."""
+    for place, option in options_of(schema):
+        value = value_at(stage, place)
+        if value is not None or (stage["stage"], place) not in tried:
+            tried.add((stage["stage"], place))
+            yield from (f"{place}={other}" for other in other_values(option, value))
 
 
 def texts_of(folder):
