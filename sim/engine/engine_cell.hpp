@@ -29,8 +29,8 @@ void Engine<Space, Rule, Sizes>::hit_slope(std::uint32_t i, Motion& motion, bool
   const FloorMotion::Motion floor = floor_.motion(now_);
   bounce(i, motion, nx, nz, floor.velocity, side_surface_);
   floor_work_ += mass * (motion.vz() - vz) * floor.velocity;
-  // A disk that lies on the side is carried in small hops, as on the floor, and parts from it alike. Beds do not come to
-  // rest on sloped sides, so ever smaller hops on nearly plastic ones would have no end.
+  // A disk that lies on the side is carried in small hops, as on the floor, and parts from it alike. Beds do not come
+  // to rest on sloped sides, so ever smaller hops on nearly plastic ones would have no end.
   const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
   const double pressing = gravity_ + floor.acceleration;
   const double slowest = 0.5 * std::max(pressing, -parting * pressing) * slope_sine_ * hop;
