@@ -224,6 +224,24 @@ TEST(TimeLeft, OfALatePartGrowsWithItsDelay) {
   EXPECT_NEAR(*time.seconds(), 10, 1e-12);
 }
 
+// A part that says again how far it is has not gone on.
+TEST(TimeLeft, OfAPartThatRepeatsItsReportIsThatOfTheFirst) {
+  double now = 0;
+  TimeLeft once(1, 1, [&] { return now; }), twice(1, 1, [&] { return now; });
+  for (TimeLeft* time : {&once, &twice}) {
+    time->expect(0, 10);
+    time->begin(0);
+    time->reached(0, 0.0);
+  }
+  now = 5;
+  once.reached(0, 0.5);
+  twice.reached(0, 0.5);
+  now = 7;
+  twice.reached(0, 0.5);
+  now = 8;
+  EXPECT_EQ(*twice.seconds(), *once.seconds());
+}
+
 // Three parts of 10, 20 and 30 s on two threads, by pencil: what runs is done after 6 and 12 s, the third begins on the
 // thread that is free first.
 TEST(TimeLeft, OfTwoThreadsIsThatOfTheLastOne) {
