@@ -4,7 +4,9 @@
 #include <array>
 #include <cctype>
 #include <cstdint>
+#include <cstdio>
 #include <fstream>
+#include <limits>
 #include <mutex>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -92,6 +94,33 @@ void refuse_if_enormous(const std::string& path, std::ifstream& file, std::uintm
                                " bytes: it is damaged or truncated");
 }
 
+bool is_jpeg(std::ifstream& file) {
+  std::array<char, 2> head{};
+  file.clear();
+  file.seekg(0);
+  return file.read(head.data(), head.size()) && head[0] == '\xff' && head[1] == '\xd8';
+}
+
+// Whether the segments and scans of a JPEG file lead to an end-of-image marker. Behind it there may be more: cameras of
+// telephones append notes, pictures and films. (ITU-T T.81, annex B)
+bool has_end_of_image(std::ifstream& file) {
+  constexpr int end_of_image = 0xd9, first_restart = 0xd0, last_restart = 0xd7, stuffed = 0x00, none = EOF;
+  file.clear();
+  file.seekg(2);
+  for (;;) {
+    // The next marker: levels of a scan are skipped, and zeros and restarts between them.
+    int marker = none;
+    do {
+      file.ignore(std::numeric_limits<std::streamsize>::max(), 0xff);
+      while ((marker = file.get()) == 0xff) {}
+    } while (marker == stuffed || (marker >= first_restart && marker <= last_restart));
+    if (marker == none || marker == end_of_image) return marker == end_of_image;
+    const int high = file.get(), low = file.get();
+    if (low == none) return false;
+    file.seekg((high << 8) + low - 2, std::ios::cur);
+  }
+}
+
 }  // namespace
 
 Kind kind_of(const fs::path& path) {
@@ -150,20 +179,9 @@ cv::Mat decode_image(const std::string& path, Kind kind, std::size_t page, const
   static LastPicture last;
   const LastPicture::Key key{path, page, bytes, fs::last_write_time(path, error)};
   if (cv::Mat again = last.find(key); !again.empty()) return again;
-  char head[2] = {};
-  file.clear();
-  file.seekg(0);
-  file.read(head, 2);
-  if (head[0] == '\xff' && head[1] == '\xd8') {
-    // libjpeg paints the missing part of a truncated picture grey: look for the end-of-image marker in the last bytes.
-    const auto tail_size = static_cast<std::streamoff>(std::min<std::uintmax_t>(bytes, 4096));
-    std::string tail(static_cast<std::size_t>(tail_size), '\0');
-    file.clear();
-    file.seekg(-tail_size, std::ios::end);
-    file.read(tail.data(), tail_size);
-    if (tail.find("\xff\xd9") == std::string::npos)
-      throw_unreadable(path, "it is truncated: its end-of-image marker is missing");
-  }
+  // libjpeg paints the missing part of a truncated picture grey.
+  if (is_jpeg(file) && !has_end_of_image(file))
+    throw_unreadable(path, "it is truncated: its end-of-image marker is missing");
   cv::Mat picture;
   constexpr int flags = cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR;
   try {

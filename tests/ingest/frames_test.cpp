@@ -269,6 +269,32 @@ TEST(Frames, APhotographIsTurnedAsItsCameraWasHeld) {
   EXPECT_LT(frame.at(8, 28), 60);
 }
 
+// Telephones append notes, a second picture or a film, which are no part of the picture. A preview in its header ends
+// earlier than the picture does.
+TEST(Frames, APhotographEndsAtItsEndOfImageMarker) {
+  const ScratchFolder folder;
+  cv::Mat noisy(200, 200, CV_8U);
+  cv::randu(noisy, 0, 255);
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", noisy, jpeg, {cv::IMWRITE_JPEG_RST_INTERVAL, 7});
+  const std::string bytes(jpeg.begin(), jpeg.end()), preview = "\xff\xd8\xff\xd9";
+  const auto read = [&](const std::string& contents) {
+    std::ofstream(folder / "a.jpg", std::ios::binary) << contents;
+    return read_frame(folder / "a.jpg");
+  };
+  const GrayFrame alone = read(bytes);
+  EXPECT_EQ(read(bytes + std::string(10'000, '\x20')).pixels, alone.pixels);
+  std::string head = "\xff\xe1";
+  head += static_cast<char>(0);
+  head += static_cast<char>(preview.size() + 2);
+  const std::string previewed = bytes.substr(0, 2) + head + preview + bytes.substr(2);
+  EXPECT_EQ(read(previewed).pixels, alone.pixels);
+  for (const std::size_t cut : {bytes.size() - 2, bytes.size() / 2, std::size_t{30}}) {
+    EXPECT_THROW(read(bytes.substr(0, cut)), InputError) << cut;
+    EXPECT_THROW(read(previewed.substr(0, cut)), InputError) << cut;
+  }
+}
+
 // A film of `count` grey pictures, each with its number written in black and white blocks that survive compression.
 constexpr int film_side = 96, film_block = 32;
 cv::Mat numbered_picture(std::size_t number) {
