@@ -10,12 +10,13 @@
 
 #include "ingest/find/edge_map.hpp"
 #include "ingest/find/picture_maps.hpp"
+#include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
 
 namespace {
 
-// Radii of the beads: the sizes of places that are looked for, the largest first. Each counts by its area.
+// Radii of the beads: the sizes of places that are looked for, the largest first.
 constexpr std::array<double, 3> tried_sizes = {1.0, 0.8, 0.6};
 constexpr double radii_covered = 0.2;  // radii of the beads: so near to a disk found, an edge is its own
 constexpr double most_overlap = 0.12;  // of a place's radius, with a disk found
@@ -27,6 +28,14 @@ constexpr double least_met = 0.65;
 constexpr int fewest_open = 6;
 // Of the beads' contrast.
 constexpr double faintest_edge = 0.25;
+// Of a disk's radius: its rim is looked for from here to farthest_edge.
+constexpr double nearest_own_edge = 0.8;
+// Cosine of the angle between the slope of a rim and the direction in which it is met: a place may lie beside the
+// centre.
+constexpr double least_across = 0.7;
+// Of the rim that the median bead found shows: in photographs beads left out show 0.7 to 1, edges of other things that
+// fill a place by chance 0.2 to 0.4. From here on a place counts in part, and from there on as a bead.
+constexpr double counts_from = 0.25, counts_fully_from = 0.75;
 constexpr double places_per_radius = 6;
 constexpr double farthest_gap = 1.5;  // radii of the beads, from a place to the nearest disk found
 // An edge is that of a wall or a floor where the tangent through it meets edges of the same direction on so much of the
@@ -76,6 +85,7 @@ class FreePlaces {
   FreePlaces(const EdgeMap& edges, const std::vector<Circle>& found, double radius, double contrast)
       : edges_(edges),
         radius_(radius),
+        contrast_(contrast),
         clearance_(edges.x.size(), static_cast<float>(4 * radius)),
         edge_(edges.x.size(), 0) {
     for (const Circle& disk : found) cover(disk.x, disk.y, disk.radius);
@@ -92,9 +102,12 @@ class FreePlaces {
           edge_[edges.at(x, y)] = 1;
     }
     sum_edges();
+    std::vector<double> shown;
+    for (const Circle& disk : found) shown.push_back(rim_shown(disk.x, disk.y, disk.radius, Edges::all));
+    shown_by_beads_ = median_of(std::move(shown));
   }
 
-  // Places of this radius, the fullest first; each covers what it lies on.
+  // Beads in places of this radius, the fullest first; each covers what it lies on.
   double take(double radius, const PixelRectangle& region) {
     struct Place {
       double met, x, y;
@@ -109,7 +122,7 @@ class FreePlaces {
     double taken = 0;
     for (const Place& place : places) {
       if (!is_free(place.x, place.y, radius)) continue;
-      ++taken;
+      taken += like_a_bead(rim_shown(place.x, place.y, radius, Edges::of_no_disk));
       cover(place.x, place.y, radius);
     }
     return taken;
@@ -189,33 +202,85 @@ class FreePlaces {
 
   // Of the directions from a place that are not covered, the share in which an edge is met.
   [[nodiscard]] double share_met(double x, double y, double radius) const {
-    static const std::array<std::array<double, 2>, tried_directions> units = [] {
-      std::array<std::array<double, 2>, tried_directions> all{};
-      for (std::size_t k = 0; k < tried_directions; ++k) {
-        const double angle = 2 * std::numbers::pi * static_cast<double>(k) / tried_directions;
-        all[k] = {std::cos(angle), std::sin(angle)};
-      }
-      return all;
-    }();
     if (!has_edges_near(x, y, radius)) return 0;  // most places
     int open = 0, met = 0;
-    for (const auto& [cosine, sine] : units) {
+    for (const Direction& direction : directions()) {
       bool edge = false, uncovered = false;
-      for (double away = nearest_edge * radius; away <= farthest_edge * radius; away += 1) {
-        const int column = static_cast<int>(x + away * cosine + 0.5), row = static_cast<int>(y + away * sine + 0.5);
-        if (column < 0 || row < 0 || column >= edges_.width || row >= edges_.height) continue;
-        const std::size_t at = edges_.at(column, row);
+      along(x, y, direction, {nearest_edge * radius, farthest_edge * radius}, [&](double away, std::size_t at) {
         uncovered = uncovered || (away > 0.8 * radius && static_cast<double>(clearance_[at]) > radii_covered * radius_);
         edge = edge || edge_[at] != 0;
-      }
+      });
       open += uncovered;
       met += uncovered && edge;
     }
     return open < fewest_open ? 0 : static_cast<double>(met) / open;
   }
 
+  // How far a place counts that shows so much of a rim.
+  [[nodiscard]] double like_a_bead(double shown) const {
+    const double most = counts_fully_from * shown_by_beads_, least = counts_from * shown_by_beads_;
+    return shown >= most ? 1 : std::max(0.0, (shown - least) / (most - least));
+  }
+
+  enum class Edges { all, of_no_disk };
+
+  // How much of a rim is seen: how steeply the level changes across it, in units of the beads' contrast and at most 1,
+  // in the mean of the directions in which no disk is near. Edges along a direction are none of a rim.
+  [[nodiscard]] double rim_shown(double x, double y, double radius, Edges edges) const {
+    const bool of_place = edges == Edges::of_no_disk;
+    const double nearest = (of_place ? nearest_edge : nearest_own_edge) * radius;
+    int open = 0;
+    double shown = 0;
+    for (const Direction& direction : directions()) {
+      bool uncovered = false;
+      along(x, y, direction, {radius, radius}, [&](double, std::size_t at) {
+        uncovered = !of_place || static_cast<double>(clearance_[at]) > radii_covered * radius_;
+      });
+      if (!uncovered) continue;
+      double steepest = 0;
+      along(x, y, direction, {nearest, farthest_edge * radius}, [&](double, std::size_t at) {
+        if (of_place && edge_[at] == 0) return;
+        const double steep = static_cast<double>(edges_.slope(at));
+        const double across =
+            static_cast<double>(edges_.x[at]) * direction[0] + static_cast<double>(edges_.y[at]) * direction[1];
+        if (std::abs(across) > least_across * steep) steepest = std::max(steepest, step_per_slope * steep);
+      });
+      ++open;
+      shown += std::min(1.0, steepest / contrast_);
+    }
+    return open > 0 ? shown / open : 0;
+  }
+
+  using Direction = std::array<double, 2>;
+  static const std::array<Direction, tried_directions>& directions() {
+    static const std::array<Direction, tried_directions> units = [] {
+      std::array<Direction, tried_directions> all{};
+      for (std::size_t k = 0; k < tried_directions; ++k) {
+        const double angle = 2 * std::numbers::pi * static_cast<double>(k) / tried_directions;
+        all[k] = {std::cos(angle), std::sin(angle)};
+      }
+      return all;
+    }();
+    return units;
+  }
+
+  // Calls look(distance, pixel) for each pixel in view in this direction.
+  struct Span {
+    double from = 0, to = 0;  // px
+  };
+  template <class Look>
+  void along(double x, double y, const Direction& direction, const Span& span, const Look& look) const {
+    for (double away = span.from; away <= span.to; away += 1) {
+      const int column = static_cast<int>(x + away * direction[0] + 0.5),
+                row = static_cast<int>(y + away * direction[1] + 0.5);
+      if (column < 0 || row < 0 || column >= edges_.width || row >= edges_.height) continue;
+      look(away, edges_.at(column, row));
+    }
+  }
+
   const EdgeMap& edges_;
-  double radius_;
+  double radius_, contrast_;
+  double shown_by_beads_ = 1;       // rim_shown() of the median disk found
   std::vector<float> clearance_;    // px to the nearest disk or place taken, below 0 inside
   std::vector<float> to_disk_;      // the same, to disks alone
   std::vector<std::uint8_t> edge_;  // 1 within a pixel of an edge that is no disk's

@@ -3,7 +3,8 @@
 //
 // Counted are places beside the disks found in which a bead fits, and which edges fill as they fill a bead. A perfect
 // search leaves voids, where no bead fits, and background, where no edges are. Straight edges of a container fill too
-// few of a place's directions.
+// few of a place's directions. Other things fill places by chance, too, with edges that are fainter than rims or do not
+// lie along one: a place counts as far as it shows a rim as the beads found do.
 
 #include <cstddef>
 #include <optional>
@@ -15,7 +16,7 @@
 namespace shakebed::ingest {
 
 // In the frame, or in this region of it; `found` in px of the frame. Places of 0.6, 0.8 and 1 of the model's radius are
-// looked for, and count by their areas.
+// looked for, and count by their areas as well.
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region);
 // The same with maps of quick_search.

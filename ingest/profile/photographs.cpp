@@ -133,8 +133,8 @@ BedFound measured(FrameSource& source, MeasureOptions options) {
     out.measurement.warnings.insert(out.measurement.warnings.begin(), warning);
   };
   const double missed = out.measurement.finder.expected_missed, wrong = out.measurement.expected_wrong;
-  judge(doubt_of_missed(missed), "%.0f %% of the beads may be missed: look at the picture before you use the numbers",
-        missed);
+  judge(doubt_of_missed(missed, wrong),
+        "%.0f %% of the beads may be missed: look at the picture before you use the numbers", missed);
   judge(doubt_of(wrong), "%.1f %% of the disks found may be wrong: look at them before you use the numbers", wrong);
   const double diameter_px = options.bead_diameter_m / out.measurement.calibration.scale_m_per_px;
   if (out.measurement.contacts.far_apart(diameter_px)) {
@@ -271,8 +271,10 @@ Doubt doubt_of(double expected_wrong) {
   return expected_wrong > share_worth_a_word ? Doubt::some : Doubt::little;
 }
 
-Doubt doubt_of_missed(double expected_missed) {
-  if (expected_missed > most_missed) return Doubt::too_many;
+Doubt doubt_of_missed(double expected_missed, double expected_wrong) {
+  // The harmonic mean of the shares of beads found and of disks that are beads (F1 score).
+  const auto right = [](double missed, double wrong) { return 2 / (1 / (1 - missed) + 1 / (1 - wrong)); };
+  if (right(expected_missed, expected_wrong) < right(most_missed, 0)) return Doubt::too_many;
   return expected_missed > share_worth_a_word ? Doubt::some : Doubt::little;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 #include "ingest/frames/background_level.hpp"
 #include "ingest/profile/bed_doubts.hpp"
@@ -15,6 +16,7 @@ namespace {
 
 // px: the radius of beads in a picture that is reduced for trials. At 10 px drawn beads are found as in the picture.
 constexpr double enough_radius_px = 10;
+constexpr double wide_enough_px = 24;  // width from which blur between touching beads does no harm (find/survey.cpp)
 
 // Holes and printed dots.
 void judge_contacts(const ExtractOptions& options, const ingest::Measurement& found) {
@@ -26,14 +28,21 @@ void judge_contacts(const ExtractOptions& options, const ingest::Measurement& fo
         found.disk_total, found.contacts.nearest_px / diameter_px));
 }
 
-void judge_missed(const ExtractOptions& options, double missed, Judgement& judgement) {
-  const ingest::Doubt doubt = ingest::doubt_of_missed(missed);
+void judge_missed(const ExtractOptions& options, const ingest::Measurement& found, Judgement& judgement) {
+  const double missed = found.finder.expected_missed, wrong = found.expected_wrong;
+  const ingest::Doubt doubt = ingest::doubt_of_missed(missed, wrong);
   if (doubt == ingest::Doubt::little) return;
-  if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round)
-    throw StageError(
-        fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places "
-                    "where a bead fits. Beads that touch and are narrower than 24 px need more pixels",
-                    100 * missed));
+  if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round) {
+    std::string why = fmt::format(
+        "About {:.0f} % of the beads may be missed: between the disks found there are edges in places where a bead "
+        "fits",
+        100 * missed);
+    if (ingest::doubt_of(wrong) != ingest::Doubt::little)
+      why += fmt::format(". {:.0f} % of the disks found may be wrong", 100 * wrong);
+    if (2 * found.calibration.radius_px < wide_enough_px)
+      why += fmt::format(". Beads that touch and are narrower than {:.0f} px need more pixels", wide_enough_px);
+    throw StageError(why);
+  }
   judgement.warning(
       fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places where "
                   "a bead fits. Look at the overlays (pictures with the disks found) before you use the density.",
@@ -169,7 +178,7 @@ Judgement judge_disks(const ExtractOptions& options, const ingest::Measurement& 
                     "before you use the numbers.",
                     100 * wrong));
   judge_contacts(options, found);
-  judge_missed(options, found.finder.expected_missed, judgement);
+  judge_missed(options, found, judgement);
   for (std::string& one : ingest::doubts_of_bed(found, options.diameter)) judgement.warning(std::move(one));
   if (options.bead_number) judge_bead_number(*options.bead_number, found.disk_count_mean, judgement);
   return judgement;

@@ -200,6 +200,9 @@ TEST(Photographs, DoubtBeginsAtTwoPercentAndForbidsAtTwenty) {
   EXPECT_EQ(doubt_of_missed(0.021), Doubt::some);
   EXPECT_EQ(doubt_of_missed(0.399), Doubt::some);
   EXPECT_EQ(doubt_of_missed(0.401), Doubt::too_many);
+  // As many right of both kinds together: 2 / (1 / 0.6 + 1) = 0.75.
+  EXPECT_EQ(doubt_of_missed(0.33, 0.12), Doubt::some);
+  EXPECT_EQ(doubt_of_missed(0.36, 0.12), Doubt::too_many);
 }
 
 TEST(Photographs, AreSearchedForWhatTheSurveySaw) {

@@ -21,6 +21,7 @@ using namespace shakebed;
 using namespace shakebed::pipelines;
 using namespace shakebed::tests;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::MatchesRegex;
@@ -486,6 +487,15 @@ TEST(DisksOfAPicture, AreAcceptedWithinLimits) {
               ElementsAre(StartsWith("About 3 % of the beads may be missed: ")));
   const auto many_missed = [](auto& found) { found.finder.expected_missed = 0.41; };
   EXPECT_THAT(said(many_missed), ElementsAre(StartsWith("refused: About 41 % of the beads may be missed: ")));
+  const auto both = [](auto& found) {
+    found.finder.expected_missed = 0.36, found.expected_wrong = 0.12;
+    found.calibration.radius_px = 11;
+  };
+  EXPECT_THAT(said(both), ElementsAre("refused: About 36 % of the beads may be missed: between the disks found there "
+                                      "are edges in places where a bead fits. 12 % of the disks found may be wrong. "
+                                      "Beads that touch and are narrower than 24 px need more pixels"));
+  const auto wide = [](auto& found) { found.finder.expected_missed = 0.41, found.calibration.radius_px = 13; };
+  EXPECT_THAT(said(wide), ElementsAre(EndsWith("there are edges in places where a bead fits")));
   const auto holes = [](auto& found) { found.contacts = {0, 100, 44, 44}; };
   EXPECT_THAT(said(holes), ElementsAre(StartsWith("refused: Hardly any of the 80 disks found touch: nearest centres "
                                                   "are typically 2.2 diameters apart.")));
