@@ -3,8 +3,8 @@
 //
 // Counted are places beside the disks found in which a bead fits, and which edges fill as they fill a bead. A perfect
 // search leaves voids, where no bead fits, and background, where no edges are. Straight edges of a container fill too
-// few of a place's directions. Other things fill places by chance, too, with edges that are fainter than rims or do not
-// lie along one: a place counts as far as it shows a rim as the beads found do.
+// few of a place's directions. Other things fill places by chance, too. Their edges are fainter than rims, or do not
+// lie along one. So a place counts as far as it shows a rim as the beads found do.
 
 #include <cstddef>
 #include <optional>

@@ -102,9 +102,9 @@ std::string why_reduced(int width, int height, int reduction);
 // above 20 %, nothing is measured.
 enum class Doubt { little, some, too_many };
 Doubt doubt_of(double expected_wrong);
-// The same of the share of beads that may be missed: `some` above 2 %, `too_many` above 40 %, or where as many errors
-// are expected of both kinds together (the harmonic mean of the shares that are right). Disks that are found hold all
-// the same, and the share is known less well.
+// The same of the share of beads that may be missed: `some` above 2 %, `too_many` above 40 %. With wrong disks as well
+// it is fewer: the harmonic mean of the shares that are right counts. Disks that are found hold all the same, and the
+// share is known less well.
 Doubt doubt_of_missed(double expected_missed, double expected_wrong = 0);
 
 struct BedFound {
