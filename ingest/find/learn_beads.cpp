@@ -347,11 +347,11 @@ void warn_of_poor_rims(const LearnedRims& rims, const RimsFound& seen, FinderCal
 }
 
 double share_missed_of(PictureMaps& maps, const RimModel& model, const RimsFound& seen,
-                       const std::optional<PixelRectangle>& region) {
+                       const std::optional<PixelRectangle>& region, PlacesCount count = PlacesCount::like_beads) {
   // Where things lie that are no beads, none are missed.
   std::vector<Circle> taken = not_round_of(model, seen);
   for (const Circle& circle : circles_of(seen.disks)) taken.push_back(circle);
-  return share_of_missed(std::max(seen.expected_missed, expected_missed_beads(maps, model, taken, region)),
+  return share_of_missed(std::max(seen.expected_missed, expected_missed_beads(maps, model, taken, region, count)),
                          seen.disks.size());
 }
 
@@ -461,12 +461,14 @@ RimsOfFrame learn_thoroughly(MapsOfFrame& maps, double radius_px, const FindOpti
   return with_disks(maps.thorough, std::move(thorough));
 }
 
-// Rims searched more thoroughly, and with edges of either sign, where the quick search misses beads and this one shows
-// clearly more of them. It takes several times as long, and where hardly any bead is missed it has little to add. (The
-// share below which it is left out was set for its time, not by a measurement of what is found.)
+// Rims searched more thoroughly, and with edges of either sign, where the quick search leaves places that could be
+// beads and this one shows clearly more of them. It takes several times as long, and where hardly any place is left it
+// has little to add. (The share below which it is left out was set for its time, not by a measurement of what is
+// found.)
 RimsOfFrame most_telling(MapsOfFrame& maps, RimsOfFrame quick, const FindOptions& options) {
   constexpr double hardly_any = 0.05;
-  if (share_missed_of(maps.quick, quick.learned.model, quick.found, options.roi) < hardly_any) return quick;
+  if (share_missed_of(maps.quick, quick.learned.model, quick.found, options.roi, PlacesCount::fully) < hardly_any)
+    return quick;
   RimsOfFrame thorough = learn_thoroughly(maps, quick.learned.model.radius_px, options);
   const bool more = expected_beads(thorough.found.disks) > worth_the_search * expected_beads(quick.found.disks);
   return more ? thorough : quick;

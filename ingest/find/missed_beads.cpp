@@ -108,7 +108,7 @@ class FreePlaces {
   }
 
   // Beads in places of this radius, the fullest first; each covers what it lies on.
-  double take(double radius, const PixelRectangle& region) {
+  double take(double radius, const PixelRectangle& region, PlacesCount count) {
     struct Place {
       double met, x, y;
     };
@@ -122,7 +122,8 @@ class FreePlaces {
     double taken = 0;
     for (const Place& place : places) {
       if (!is_free(place.x, place.y, radius)) continue;
-      taken += like_a_bead(rim_shown(place.x, place.y, radius, Edges::of_no_disk));
+      const bool fully = count == PlacesCount::fully;
+      taken += fully ? 1 : like_a_bead(rim_shown(place.x, place.y, radius, Edges::of_no_disk));
       cover(place.x, place.y, radius);
     }
     return taken;
@@ -296,7 +297,7 @@ double expected_missed_beads(const GrayFrame& frame, const RimModel& model, cons
 }
 
 double expected_missed_beads(PictureMaps& maps, const RimModel& model, const std::vector<Circle>& found,
-                             const std::optional<PixelRectangle>& region) {
+                             const std::optional<PixelRectangle>& region, PlacesCount count) {
   // A threshold that was learned at another scale says nothing here.
   const bool of_this_scale = model.search.wanted_px == quick_search.wanted_px;
   const auto& [at, edges, copies] = maps.scaled_for(model.radius_px, of_this_scale ? model.threshold : 0);
@@ -318,7 +319,7 @@ double expected_missed_beads(PictureMaps& maps, const RimModel& model, const std
   const double radius = model.radius_px / at.scale;
   FreePlaces places(edges, disks, radius, model.contrast);
   double missed = 0;
-  for (const double size : tried_sizes) missed += size * size * places.take(size * radius, searched);
+  for (const double size : tried_sizes) missed += size * size * places.take(size * radius, searched, count);
   return missed;
 }
 

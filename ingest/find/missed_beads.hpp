@@ -15,13 +15,16 @@
 
 namespace shakebed::ingest {
 
+// like_beads: as said above. fully: all alike, which says how much a search left that could be beads.
+enum class PlacesCount { like_beads, fully };
+
 // In the frame, or in this region of it; `found` in px of the frame. Places of 0.6, 0.8 and 1 of the model's radius are
 // looked for, and count by their areas as well.
 double expected_missed_beads(const GrayFrame& frame, const RimModel& model, const std::vector<Circle>& found,
                              const std::optional<PixelRectangle>& region);
 // The same with maps of quick_search.
 double expected_missed_beads(PictureMaps& maps, const RimModel& model, const std::vector<Circle>& found,
-                             const std::optional<PixelRectangle>& region);
+                             const std::optional<PixelRectangle>& region, PlacesCount count = PlacesCount::like_beads);
 
 // Of all beads, the share of those missed.
 double share_of_missed(double missed, std::size_t found);
