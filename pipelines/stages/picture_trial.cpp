@@ -33,15 +33,15 @@ void judge_missed(const ExtractOptions& options, const ingest::Measurement& foun
   const ingest::Doubt doubt = ingest::doubt_of_missed(missed, wrong);
   if (doubt == ingest::Doubt::little) return;
   if (doubt == ingest::Doubt::too_many && options.shape == BeadShape::round) {
-    std::string why = fmt::format(
-        "About {:.0f} % of the beads may be missed: between the disks found there are edges in places where a bead "
-        "fits",
-        100 * missed);
+    std::string more;
     if (ingest::doubt_of(wrong) != ingest::Doubt::little)
-      why += fmt::format(". {:.0f} % of the disks found may be wrong", 100 * wrong);
+      more += fmt::format(". {:.0f} % of the disks found may be wrong", 100 * wrong);
     if (2 * found.calibration.radius_px < wide_enough_px)
-      why += fmt::format(". Beads that touch and are narrower than {:.0f} px need more pixels", wide_enough_px);
-    throw StageError(why);
+      more += fmt::format(". Beads that touch and are narrower than {:.0f} px need more pixels", wide_enough_px);
+    throw StageError(
+        fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places "
+                    "where a bead fits{}",
+                    100 * missed, more));
   }
   judgement.warning(
       fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places where "
