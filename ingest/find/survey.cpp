@@ -61,9 +61,6 @@ constexpr std::size_t most_two_sided = 3;
 constexpr double same_as_both_sides = 1.06;
 // Of the picture's shorter side: larger radii are not proposed, since a bed shows more than two beads in a row.
 constexpr double largest_proposed = 0.25;
-// px, width from which blur does not make the outlines of touching beads look not round, as it does up to coarse_px:
-// drawn crystals with blur of up to 1.2 px and noise of up to 10 grey levels.
-constexpr double wide_enough_px = 24;
 // Circles that are not wide are believed where at least so many are seen nearly whole, and no harmonic of their
 // outlines exceeds this, radii: of drawn disks of 5 to 10 px up to 0.005, with much noise 0.009; of hexagons of 8.5 px
 // 0.020, and of other shapes 0.022 to 0.09.

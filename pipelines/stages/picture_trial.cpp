@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "ingest/find/survey.hpp"
 #include "ingest/frames/background_level.hpp"
 #include "ingest/profile/bed_doubts.hpp"
 #include "ingest/profile/photographs.hpp"
@@ -16,7 +17,6 @@ namespace {
 
 // px: the radius of beads in a picture that is reduced for trials. At 10 px drawn beads are found as in the picture.
 constexpr double enough_radius_px = 10;
-constexpr double wide_enough_px = 24;  // width from which blur between touching beads does no harm (find/survey.cpp)
 
 // Holes and printed dots.
 void judge_contacts(const ExtractOptions& options, const ingest::Measurement& found) {
@@ -36,8 +36,9 @@ void judge_missed(const ExtractOptions& options, const ingest::Measurement& foun
     std::string more;
     if (ingest::doubt_of(wrong) != ingest::Doubt::little)
       more += fmt::format(". {:.0f} % of the disks found may be wrong", 100 * wrong);
-    if (2 * found.calibration.radius_px < wide_enough_px)
-      more += fmt::format(". Beads that touch and are narrower than {:.0f} px need more pixels", wide_enough_px);
+    if (2 * found.calibration.radius_px < ingest::wide_enough_px)
+      more +=
+          fmt::format(". Beads that touch and are narrower than {:.0f} px need more pixels", ingest::wide_enough_px);
     throw StageError(
         fmt::format("About {:.0f} % of the beads may be missed: between the disks found there are edges in places "
                     "where a bead fits{}",

@@ -77,6 +77,7 @@ RECORDED = {
     "ingest": ("pictures", "strangers"),
     "pipelines": ("commands", "beds", "pictures", "tables", "mistakes", "shipped"),
 }
+ALL_RECORDED = ("beds", "commands", "mistakes", "pictures", "shipped", "strangers", "tables")
 # What is asked last of a fault that no other test has noticed: commands that end with 0, or with 77 where they are skipped.
 LAST = {
     "pipelines": (("house.reference", ("python3", "SOURCE/docs/write_reference.py", "PROGRAM", "--check")),
@@ -567,8 +568,8 @@ class Bench:
                 os.replace(self.sound(Path(output).name), self.program(output))
 
     def ask_long(self, row):
-        """The long tests of the programs of the room and of those above, and those that start the program, the quickest
-        first. Of other tests (packages, browsers' libraries, fuzzing) none is asked."""
+        """The long tests of the programs of the room and of those above, and those that start the program: recorded
+        results first, then the quickest. Of other tests (packages, browsers' libraries, fuzzing) none is asked."""
         before = self.cpu
         for name, command, usual in long_tests(self, row["room"]):
             if self.limit and self.cpu - before > self.limit:
@@ -615,8 +616,10 @@ class Bench:
                     return "noticed", failed[0]
                 print(f"{failed[0]} fails without a fault: not used", flush=True)
                 tests = [test for test in tests if test not in self.unfit]
-        if part in ("first", "all"):
-            changed = self.changed_record(row["room"])
+        likely = RECORDED[row["room"]]
+        others = [group for group in ALL_RECORDED if group not in likely]
+        for groups in ([likely] if part in ("first", "all") else []) + ([others] if part in ("rest", "all") else []):
+            changed = self.changed_record(groups)
             if changed:
                 return "noticed", changed
         if part == "first":
@@ -636,9 +639,9 @@ class Bench:
         self.cpu += cpu
         return code == 0
 
-    def changed_record(self, room):
+    def changed_record(self, groups):
         """The first group of recorded results that a fault changes, and that is as recorded without it; "" for none."""
-        for group in RECORDED[room]:
+        for group in groups:
             name = f"recorded.{group}"
             if name in self.unfit or self.record_is_same(group):
                 continue
@@ -668,7 +671,8 @@ def quick_filter(base, program):
 
 
 def long_tests(bench, room):
-    """(name, command, usual seconds) of the long tests that a fault of a room is put to, the quickest first."""
+    """(name, command, usual seconds) of the long tests that a fault of a room is put to: recorded results first, then
+    the quickest."""
     listed = json.loads(subprocess.run(["ctest", "--test-dir", str(bench.base), "-L", "long", "--show-only=json-v1"],
                                        check=True, capture_output=True, text=True).stdout)["tests"]
     costs = recorded_costs(bench)
@@ -681,7 +685,7 @@ def long_tests(bench, room):
         command = [str(programs.get(word, word)) for word in test["command"]]
         if command != test["command"]:
             found.append((test["name"], command, costs.get(test["name"], 60.0)))
-    return sorted(found, key=lambda one: one[2])
+    return sorted(found, key=lambda one: (not one[0].startswith("recorded."), one[2]))
 
 
 def recorded_costs(bench):
