@@ -131,8 +131,7 @@ class GeometryFinder {
     if (apart < worth_a_word * touching.px) return;
     warnings_.push_back(formatted(
         "Nearest beads are %.4g px apart, but the circles seen are %.4g px wide. The outline is larger than the bead "
-        "(a "
-        "shadow or a halo), or beads are of several sizes. The error of the scale includes half of the difference.",
+        "(a shadow or a halo), or beads are of several sizes. The error of the scale includes half of the difference.",
         touching.px * refined_.recorded_px, 2 * refined_.radius_px * refined_.recorded_px));
   }
 

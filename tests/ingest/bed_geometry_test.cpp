@@ -428,6 +428,7 @@ TEST(BedGeometry, WeighsTheOutlineAgainstTheDistanceOfTouchingBeads) {
     EXPECT_NEAR(radius, 0.5 * distance, 1e-9);
     EXPECT_NEAR(error, 0.5 * its_error, 1e-9);
     EXPECT_TRUE(any_holds(warnings, "The outline seen is smaller than the beads"));
+    EXPECT_TRUE(any_holds(warnings, "The circles seen are 19.2 px wide. Nearest beads are "));
     EXPECT_TRUE(any_holds(warnings, "mm/px"));
     EXPECT_EQ(std::get<0>(found(9.2, 0.01, false)), 9.2) << "these do not touch";
     EXPECT_TRUE(any_holds(std::get<2>(found(9.6, 0.01, false, true)), "The scale given is used"));
@@ -436,7 +437,7 @@ TEST(BedGeometry, WeighsTheOutlineAgainstTheDistanceOfTouchingBeads) {
     const auto [radius, error, warnings] = found(10.6, 0.01, false);
     EXPECT_EQ(radius, 10.6);
     EXPECT_NEAR(error, std::hypot(0.01, 0.25 * (21.2 - distance)), 1e-9);
-    EXPECT_TRUE(any_holds(warnings, "The outline is larger than the bead"));
+    EXPECT_TRUE(any_holds(warnings, "but the circles seen are 21.2 px wide. The outline is larger than the bead"));
   }
   {  // Of beads lit from one side the distance counts alone.
     const auto [radius, error, warnings] = found(8.7, 0.5, true);

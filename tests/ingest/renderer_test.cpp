@@ -40,6 +40,33 @@ double covered_share(double radius, double dx, double dy) {
   return area;
 }
 
+// A row that touches the left wall and leaves 15 px at its right end. Its last disk moves where its jitter leads to the
+// right and upwards, in a quarter of 80 rows (20 +- 3.9; here within four of these). The others cannot move.
+TEST(DrawnBeds, AreJitteredWhereThereIsRoom) {
+  std::size_t last = 0, others = 0;
+  for (std::uint64_t seed = 1; seed <= 80; ++seed) {
+    SyntheticBed bed{.left_wall_px = 10, .right_wall_px = 225, .floor_px = 100, .radius_px = 10, .rows = 1};
+    bed.seed = seed;
+    const std::vector<RenderedDisk> row = make_synthetic_bed(bed);
+    bed.jitter_px = 0.5;
+    const std::vector<RenderedDisk> jittered = make_synthetic_bed(bed);
+    ASSERT_EQ(row.size(), 10U);
+    ASSERT_EQ(jittered.size(), 10U);
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      const double right = jittered[k].x_px - row[k].x_px, down = jittered[k].y_px - row[k].y_px;
+      (k == 9 ? last : others) += right != 0 || down != 0;
+      EXPECT_LT(std::hypot(right, down), 5 * bed.jitter_px);
+      EXPECT_LE(down, 0);
+      if (k > 0) {
+        EXPECT_GE(std::hypot(jittered[k].x_px - jittered[k - 1].x_px, jittered[k].y_px - jittered[k - 1].y_px),
+                  20 - 1e-9);
+      }
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(last), 20, 16);
+  EXPECT_LT(others, 30U);
+}
+
 TEST(DrawnPixels, OfASharpDiskAreTheirCoveredShares) {
   const Camera camera = unrounded(30, 26);
   for (const double radius : {6.4, 0.4, 1.0})

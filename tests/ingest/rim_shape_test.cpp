@@ -83,9 +83,9 @@ Circle shape_circle(double x, double y, double radius) {
 }
 
 std::vector<RimShape> rim_shapes_in(const GrayFrame& frame, const std::vector<Circle>& circles,
-                                    const std::vector<Circle>& disks) {
+                                    const std::vector<Circle>& disks, Polarity polarity = Polarity::dark_beads) {
   RimModel model;
-  model.polarity = Polarity::dark_beads;
+  model.polarity = polarity;
   PictureMaps maps(frame, model.search.wanted_px);
   return shapes_of_rims(maps, model, circles, disks);
 }
@@ -106,6 +106,28 @@ TEST(RimShape, HasTheElongationOfAnOvalAndNoneOfABead) {
   EXPECT_FALSE(departs_from_round(shapes[0], 0));
   // What all have in common is no departure.
   EXPECT_FALSE(departs_from_round(shapes[1], expected));
+}
+
+// The negative of a picture has the same shapes, whether their brightness is known or not. A rim of the other sign is
+// none.
+TEST(RimShape, OfBrightOnesIsThatOfDarkOnes) {
+  ShapeScene scene(120, 60);
+  scene.bead(30, 30, 14);
+  scene.oval(85, 30, 15.5, 12.5, 0.6);
+  const std::vector<Circle> circles = {shape_circle(30, 30, 14), shape_circle(85, 30, 14)};
+  const GrayFrame dark = scene.seen(0.8, 2);
+  GrayFrame bright = dark;
+  for (float& level : bright.pixels) level = 255 - level;
+  const std::vector<RimShape> expected = rim_shapes_in(dark, circles, circles);
+  for (const Polarity polarity : {Polarity::bright_beads, Polarity::automatic}) {
+    const std::vector<RimShape> shapes = rim_shapes_in(bright, circles, circles, polarity);
+    for (std::size_t k = 0; k < shapes.size(); ++k) {
+      EXPECT_NEAR(std::abs(shapes[k].second - expected[k].second), 0, 1e-4);
+      EXPECT_NEAR(shapes[k].std_error, expected[k].std_error, 1e-4);
+    }
+  }
+  for (const RimShape& shape : rim_shapes_in(bright, circles, circles, Polarity::dark_beads))
+    EXPECT_FALSE(departs_from_round(shape, 0));
 }
 
 TEST(RimShape, EndsOfCapsulesDepartWhateverTheirLength) {
