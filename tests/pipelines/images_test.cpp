@@ -603,7 +603,7 @@ TEST(FrameBudget, TriesFramesOfFewerPixelsWhereManyAreMeasured) {
   const ProgramResult blind = fit("blind", {"--set", "/stages/extract/reduction=5"});
   EXPECT_EQ(blind.exit_code, 5);
   EXPECT_THAT(blind.err, HasSubstr("averaged over squares of 5 px (reduction), a bead of 12."));
-  EXPECT_THAT(blind.err, HasSubstr("px radius is left with 2.5 px; 3 px are needed. Give at most 4"));
+  EXPECT_THAT(blind.err, HasSubstr("px radius is left with 2.48 px; 3 px are needed. Give at most 4"));
 }
 
 }  // namespace

@@ -242,6 +242,18 @@ TEST(TimeLeft, OfAPartThatRepeatsItsReportIsThatOfTheFirst) {
   EXPECT_EQ(*twice.seconds(), *once.seconds());
 }
 
+// A part that was complete when it was taken up says nothing of the pace.
+TEST(TimeLeft, OfAPartThatWasCompleteIsUnknown) {
+  double now = 0;
+  TimeLeft time(2, 1, [&] { return now; });
+  time.begin(0);
+  time.reached(0, 1.0);
+  now = 1;
+  time.end(0);
+  EXPECT_FALSE(time.seconds().has_value());
+  EXPECT_EQ(time.fraction(), 0);
+}
+
 // Three parts of 10, 20 and 30 s on two threads, by pencil: what runs is done after 6 and 12 s, the third begins on the
 // thread that is free first.
 TEST(TimeLeft, OfTwoThreadsIsThatOfTheLastOne) {
