@@ -35,7 +35,7 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 RELATIVE = 1e-6  # differences of numbers between machines and compilers are smaller, and those of faults larger
 OF_PIXELS = 1e-4  # the same of what is found in pictures: OpenCV's filters differ by rounding with the processor
-PIXEL_GROUPS = {"pictures", "strangers"}
+PIXEL_GROUPS = {"pictures", "strangers", "many_strangers", "options_of_pictures"}
 ABSOLUTE = 1e-9  # the same, of the largest of several means: a mean of nearly 0 is a difference of larger numbers
 NUMBER = re.compile(r"(?<![\w#.])[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?(?![\w.]*\w)", re.IGNORECASE)
 SHOWN = 30  # differing lines
