@@ -131,6 +131,30 @@ TEST(SlopedSides, ThatAreNearlyPlasticAreTouchedAtMostTwiceInAContactDuration) {
   }
 }
 
+// A plastic contact with a side that falls away ends: rounding alone does not make it last.
+TEST(SlopedSides, LetGoWhenTheyFallAway) {
+  class Limited final : public Touches {
+   public:
+    void touched_wall(double, std::uint32_t, bool, double, double, double) override {
+      if (++count > 200'000) throw std::runtime_error("contacts without end");
+    }
+    std::size_t count = 0;
+  };
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Scene scene = thrown({0.2, 0, 0, 0, 0}, true, Surface{0, 0.1, 0});
+    scene.seed = seed;
+    scene.disks.species = {{30, 1, 1}};
+    scene.disks.contact = {0.9, 0, 0};
+    scene.disks.contact_duration = 1e-4;
+    scene.box.floor = SinusoidalFloor{0.6, 0.4};
+    scene.start = HexagonalStart{};
+    Limited touches;
+    const auto bed = simulate(scene);
+    bed->watch(&touches);
+    EXPECT_NO_THROW(bed->advance_to(2.5)) << seed;
+  }
+}
+
 // What a smooth side gives is along its normal: the momentum along the side stays. An elastic one at rest keeps the
 // energy, an inelastic one keeps e of the velocity along the normal.
 TEST(SlopedSides, KeepTheMomentumAlongThemAndTheEnergy) {
