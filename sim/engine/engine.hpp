@@ -65,7 +65,7 @@ inline constexpr double asserted_rounding = 1e-9;
 // Duration of the hop of a disk at rest on the floor: that of a contact, or this without a contact clock. A disk that
 // hopped for longer would be thrown [sqrt(D/g)].
 inline constexpr double rest_hop = 1e-4, longest_hop = 0.1;
-// With this share of the velocity of such a hop a disk parts from a floor that falls away.
+// Of the velocity of such a hop: with this share a disk parts from a floor that falls away.
 inline constexpr double parting = 1e-3;
 
 // In which order events are taken: that of time, or tile by tile and then the rest in the order of time.
@@ -219,6 +219,7 @@ class Engine final : public Simulation {
   void exchange(std::uint32_t i, std::uint32_t j, Motion& first, Motion& second);
   void hit_wall(std::uint32_t i);
   void hit_floor(std::uint32_t i, Motion& motion);
+  double hop_velocity(double floor_acceleration, double slope_sine = 1) const;
   // --- a cell's sloped sides and free lid: engine_cell.hpp
   struct FreeLid {
     double mass = never;  // never: it stands still

@@ -202,17 +202,22 @@ void Engine<Space, Rule, Sizes>::hit_floor(std::uint32_t i, Motion& motion) {
   const double vz_before = motion.vz();
   bounce(i, motion, 0, -1, floor.velocity, floor_surface_);
   floor_work_ += mass * (motion.vz() - vz_before) * floor.velocity;
-  // A disk that lies still on the floor is carried in small hops: a contact has
-  // to end before the next can begin. A disk that the floor leaves parts from it: after a plastic contact rounding
-  // alone would decide whether they touch.
-  const double pressing = gravity_ + floor.acceleration;
-  const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
-  const double slowest = 0.5 * std::max(pressing, -parting * pressing) * hop;
+  const double slowest = hop_velocity(floor.acceleration);
   if (motion.vz() - floor.velocity < 1e-3 * slowest) {
     const double slow = motion.vz();
     motion.velocity[1] = floor.velocity + slowest;
     floor_work_ += 0.5 * mass * (motion.vz() - slow) * (motion.vz() + slow);
   }
+}
+
+// With which velocity [sqrt(g D)] along the normal a disk that lies still on the floor, or on a sloped side, leaves it.
+// It is carried in small hops: a contact has to end before the next can begin. From a floor that falls away it parts:
+// after a plastic contact rounding alone would decide whether they touch.
+template <class Space, class Rule, class Sizes>
+double Engine<Space, Rule, Sizes>::hop_velocity(double floor_acceleration, double slope_sine) const {
+  const double pressing = gravity_ + floor_acceleration;
+  const double hop = contact_duration_ > 0 ? std::min(contact_duration_, longest_hop) : rest_hop;
+  return 0.5 * std::max(pressing, -parting * pressing) * slope_sine * hop;
 }
 
 // One disk against a wall that moves vertically; (nx, nz) points from the disk

@@ -73,6 +73,7 @@ Outline some_oval(std::mt19937& random) {
 }
 double some_size(std::mt19937& random) { return between(random, 7, 20); }
 
+// Random numbers are drawn in this order: compilers evaluate arguments of a call in different orders.
 GrayFrame many_somehow(std::mt19937& random, const std::function<Outline()>& outline) {
   const bool turned_alike = coin(random), on_lattice = coin(random);
   return many_of(random, outline(), on_lattice, turned_alike);

@@ -41,7 +41,8 @@ double covered_share(double radius, double dx, double dy) {
 }
 
 // A row that touches the left wall and leaves 15 px at its right end. Its last disk moves where its jitter leads to the
-// right and upwards, in a quarter of 80 rows (20 +- 3.9; here within four of these). The others cannot move.
+// right and upwards, in a quarter of 80 rows (20 +- 3.9; here within four of these). Those between two others have to
+// move up by more than twice the root of the radius times the way to the side: 3.4 of them do on average.
 TEST(DrawnBeds, AreJitteredWhereThereIsRoom) {
   std::size_t last = 0, others = 0;
   for (std::uint64_t seed = 1; seed <= 80; ++seed) {
@@ -64,7 +65,7 @@ TEST(DrawnBeds, AreJitteredWhereThereIsRoom) {
     }
   }
   EXPECT_NEAR(static_cast<double>(last), 20, 16);
-  EXPECT_LT(others, 30U);
+  EXPECT_LT(others, 15U);
 }
 
 TEST(DrawnPixels, OfASharpDiskAreTheirCoveredShares) {

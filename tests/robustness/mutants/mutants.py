@@ -15,6 +15,7 @@ library of Python 3.9 is enough.
 
 import argparse
 import csv
+import functools
 import json
 import os
 import random
@@ -77,7 +78,6 @@ RECORDED = {
     "ingest": ("pictures", "strangers"),
     "pipelines": ("commands", "beds", "pictures", "tables", "mistakes", "shipped"),
 }
-ALL_RECORDED = ("beds", "commands", "mistakes", "pictures", "shipped", "strangers", "tables")
 # What is asked last of a fault that no other test has noticed: commands that end with 0, or with 77 where they are skipped.
 LAST = {
     "pipelines": (("house.reference", ("python3", "SOURCE/docs/write_reference.py", "PROGRAM", "--check")),
@@ -617,7 +617,7 @@ class Bench:
                 print(f"{failed[0]} fails without a fault: not used", flush=True)
                 tests = [test for test in tests if test not in self.unfit]
         likely = RECORDED[row["room"]]
-        others = [group for group in ALL_RECORDED if group not in likely]
+        others = [group for group in quick_records(self.base) if group not in likely]
         for groups in ([likely] if part in ("first", "all") else []) + ([others] if part in ("rest", "all") else []):
             changed = self.changed_record(groups)
             if changed:
@@ -655,6 +655,14 @@ class Bench:
                 return name
             print(f"{name} differs without a fault: not used", flush=True)
         return ""
+
+
+@functools.cache
+def quick_records(base):
+    """The groups of recorded results that are no long tests."""
+    listed = subprocess.run(["ctest", "--test-dir", str(base), "-L", "recorded", "-LE", "long", "--show-only=json-v1"],
+                            check=True, capture_output=True, text=True).stdout
+    return [test["name"].removeprefix("recorded.") for test in json.loads(listed)["tests"]]
 
 
 def quick_filter(base, program):
