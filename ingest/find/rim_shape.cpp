@@ -218,6 +218,8 @@ std::vector<RimShape> shapes_of_rims(PictureMaps& maps, const RimModel& model, c
   return shapes;
 }
 
+double axes_of(std::complex<double> second) { return (1 + second.real()) / (1 - second.real()); }
+
 std::complex<double> shared_second(const std::vector<RimShape>& shapes) {
   std::vector<double> real, imaginary;
   for (const RimShape& shape : shapes)

@@ -27,6 +27,9 @@ std::vector<RimShape> shapes_of_rims(PictureMaps& maps, const RimModel& model, c
 // What the rims have in common (light from one side, pixels that are not square): the median. 0 of fewer than three.
 std::complex<double> shared_second(const std::vector<RimShape>& shapes);
 
+// Width over height of ovals whose outlines have this second harmonic.
+double axes_of(std::complex<double> second);
+
 // Whether the rim is plainly that of something else than what has the shared harmonic.
 bool departs_from_round(const RimShape& shape, std::complex<double> shared);
 

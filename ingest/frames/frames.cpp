@@ -337,6 +337,17 @@ std::optional<double> FrameSource::film_rate_hz() const {
   return std::nullopt;
 }
 
+double stated_pixel_aspect(const std::string& path) {
+  if (kind_of(path) != Kind::film) return 1;
+  try {
+    const double aspect = Film(path, {}).pixel_aspect();
+    if (std::isfinite(aspect) && aspect > 0) return aspect;
+  } catch (const InputError&) {
+    // Reading the film says why.
+  }
+  return 1;
+}
+
 std::optional<std::size_t> FrameSource::count_if_known() const {
   if (state_->make) return state_->wanted_before(state_->made_count);
   std::size_t count = 0;

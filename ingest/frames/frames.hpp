@@ -135,6 +135,9 @@ class FrameSource {
   std::unique_ptr<State> state_;
 };
 
+// Width over height of a pixel, as a film states it; 1 where it states none, and for image files.
+double stated_pixel_aspect(const std::string& path);
+
 // The page-th picture of an image file, or the page-th frame of a film. Throws InputError.
 GrayFrame read_frame(const std::filesystem::path& path, std::size_t page = 0, const FrameSourceOptions& options = {});
 

@@ -32,6 +32,11 @@ class Film {
 
   // Frames a second, as stated in the film.
   double rate_hz() const { return capture_.get(cv::CAP_PROP_FPS); }
+  // Width over height of a pixel, as stated in the film; 0 where it is not.
+  double pixel_aspect() const {
+    const double height = capture_.get(cv::CAP_PROP_SAR_DEN);
+    return height > 0 ? capture_.get(cv::CAP_PROP_SAR_NUM) / height : 0;
+  }
 
   // Goes past the picture at `index` without decoding it into memory; false when the film ends before.
   bool step_over(std::size_t index) {

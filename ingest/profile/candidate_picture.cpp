@@ -45,11 +45,15 @@ struct CandidatePictures::State {
 CandidatePictures::CandidatePictures(const ChannelFrames& frames, int most_px) : state_(std::make_unique<State>()) {
   state_->picture = colours_of(frames, most_px, state_->scale);
 }
-CandidatePictures::CandidatePictures(const std::filesystem::path& source, std::size_t page, int most_px)
-    : CandidatePictures(read_channels(source, page, pixels_to_draw), most_px) {}
+CandidatePictures::CandidatePictures(const std::filesystem::path& source, std::size_t page, double pixel_aspect,
+                                     int most_px)
+    : CandidatePictures(read_channels(source, page, pixels_to_draw), most_px) {
+  if (pixel_aspect != 1) cv::resize(state_->picture, state_->picture, {}, pixel_aspect, 1, cv::INTER_LINEAR);
+}
 CandidatePictures::~CandidatePictures() = default;
 
-void CandidatePictures::write(const std::filesystem::path& path, const SurveyCandidate* candidate) const {
+void CandidatePictures::write(const std::filesystem::path& path, const SurveyCandidate* candidate,
+                              double bead_aspect) const {
   const double scale = state_->scale;
   const cv::Mat picture = state_->picture.clone();
   constexpr int shift = 4;  // sub-pixel drawing: 1/16 px
@@ -58,9 +62,10 @@ void CandidatePictures::write(const std::filesystem::path& path, const SurveyCan
     for (const RimDisk& disk : candidate->disks) {
       constexpr double sure = 0.9;
       const cv::Scalar colour = disk.probability >= sure ? cv::Scalar(255, 0, 255) : cv::Scalar(0, 230, 255);
-      cv::circle(picture, {fixed((disk.circle.x + 0.5) * scale - 0.5), fixed((disk.circle.y + 0.5) * scale - 0.5)},
-                 fixed(disk.circle.radius * scale), colour, disk.circle.radius * scale > 12 ? 2 : 1, cv::LINE_AA,
-                 shift);
+      const double radius = disk.circle.radius * scale;
+      cv::ellipse(picture, {fixed((disk.circle.x + 0.5) * scale - 0.5), fixed((disk.circle.y + 0.5) * scale - 0.5)},
+                  {fixed(bead_aspect * radius), fixed(radius)}, 0, 0, 360, colour, radius > 12 ? 2 : 1, cv::LINE_AA,
+                  shift);
     }
   std::vector<std::uint8_t> bytes;
   cv::imencode(".png", picture, bytes);

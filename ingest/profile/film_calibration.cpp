@@ -74,8 +74,11 @@ std::optional<FinderCalibration> learn_second_by_rims(const GrayFrame& frame, do
 class FilmLearner {
  public:
   FilmLearner(FrameSource& source, const MeasureOptions& asked)
-      : source_(source), find_(asked.find), lens_{asked.pixel_aspect.value_or(1.0), asked.lens_radial.value_or(0.0)} {
+      : source_(source),
+        find_(asked.find),
+        lens_{asked.pixel_aspect.value_or(asked.first_pixel_aspect), asked.lens_radial.value_or(0.0)} {
     film_.options = asked;
+    if (find_.roi) find_.roi = widened(*find_.roi, lens_.pixel_aspect);
     find_.one_size = asked.second_diameter_m.has_value();
     if (asked.scale_m_per_px && !find_.radius_px)  // a good first value; refined all the same
       find_.radius_px = 0.5 * asked.bead_diameter_m / *asked.scale_m_per_px;
@@ -203,9 +206,10 @@ class FilmLearner {
     there.roi = part_on(*side, frame.width, frame.height);
     CalibrationResult again = learn_beads(pointers_to(straight_), there);
     if (!again.found) return;
-    find_ = there, film_.options.find.roi = there.roi;
+    const PixelRectangle recorded = widened(*there.roi, 1 / lens_.pixel_aspect);
+    find_ = there, film_.options.find.roi = recorded;
     calibrated_ = std::move(again);
-    film_.warnings.push_back(why_only_a_part(*there.roi, find_.recorded_px));
+    film_.warnings.push_back(why_only_a_part(recorded, find_.recorded_px));
   }
 
   // Pixels and lens from the rims of the beads: what is clearly there is taken out, and all is learned again.
@@ -246,7 +250,9 @@ class FilmLearner {
     Lens better = lens_;
     const bool bent = lens_.radial != 0, wide = lens_.pixel_aspect != 1;
     if (!options.pixel_aspect && clear(left.lens.pixel_aspect - 1, left.aspect_std_error, wide, sigmas_of_aspect))
-      better.pixel_aspect = std::clamp(lens_.pixel_aspect * left.lens.pixel_aspect, 1 - most_bend, 1 + most_bend);
+      better.pixel_aspect = std::clamp(lens_.pixel_aspect * left.lens.pixel_aspect / options.first_pixel_aspect,
+                                       1 - most_bend, 1 + most_bend) *
+                            options.first_pixel_aspect;
     if (!options.lens_radial && (bent || left.by_size_and_shape()) &&
         clear(left.lens.radial, left.radial_std_error, bent, sigmas_of_radial))
       better.radial = std::clamp(lens_.radial + left.lens.radial, -most_bend, most_bend);

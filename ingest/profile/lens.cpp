@@ -13,7 +13,7 @@ namespace shakebed::ingest {
 
 LensMap::LensMap(const Lens& lens, int recorded_width, int recorded_height)
     : lens_(lens), recorded_width_(recorded_width), recorded_height_(recorded_height) {
-  if (!(lens.pixel_aspect >= 0.5 && lens.pixel_aspect <= 2))
+  if (!(lens.pixel_aspect >= narrowest_pixel && lens.pixel_aspect <= widest_pixel))
     throw std::invalid_argument("lens: pixel_aspect must lie in 0.5 .. 2");
   if (!(std::abs(lens.radial) <= 0.3)) throw std::invalid_argument("lens: radial must lie in -0.3 .. 0.3");
   const double wide = recorded_width * lens.pixel_aspect;
@@ -40,6 +40,12 @@ double LensMap::shrink(double q) const {
   double s = 1;
   for (int round = 0; round < 6; ++round) s -= (s + k * s * s * s - 1) / std::max(0.1, 1 + 3 * k * s * s);
   return s;
+}
+
+PixelRectangle widened(const PixelRectangle& rectangle, double by) {
+  const auto edge = [&](int column) { return static_cast<int>(std::lround(column * by)); };
+  const int left = edge(rectangle.left);
+  return {left, rectangle.top, std::max(1, edge(rectangle.left + rectangle.width) - left), rectangle.height};
 }
 
 PixelPlace LensMap::to_recorded(PixelPlace seen) const {

@@ -21,6 +21,9 @@ struct Lens {
   [[nodiscard]] bool plain() const { return pixel_aspect == 1 && radial == 0; }
 };
 
+// Width over height of a pixel.
+inline constexpr double narrowest_pixel = 0.5, widest_pixel = 2;
+
 struct PixelPlace {
   double x = 0, y = 0;
 };
@@ -49,6 +52,9 @@ class LensMap {
   double margin_x_ = 0, margin_y_ = 0;
   double middle_x_ = 0, middle_y_ = 0, half_diagonal_ = 1;  // stretched, without the margin
 };
+
+// A rectangle of a frame, in the frame whose columns are `by` times as wide.
+PixelRectangle widened(const PixelRectangle& rectangle, double by);
 
 // The remaining aspect and radial term in frames that were assumed undistorted, from the beads' own rims. Least
 // squares, over all whole disks, of the residual on the shift of the rims that each term would cause. Standard errors

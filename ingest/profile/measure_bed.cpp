@@ -536,6 +536,10 @@ std::vector<std::string> MeasureOptions::validate() const {
   require(positive(bin_width), formatted("bin_width is %g; it must be above 0", bin_width));
   require(kernel.kind != KernelKind::none && positive(kernel.width),
           "the density is measured through a kernel: give a kernel other than none, with a finite width above 0");
+  for (const double aspect : {pixel_aspect.value_or(1), first_pixel_aspect})
+    require(aspect >= narrowest_pixel && aspect <= widest_pixel,
+            formatted("a pixel's width over its height is given as %g; it must lie in %g .. %g", aspect,
+                      narrowest_pixel, widest_pixel));
   require(!left_wall_px || !right_wall_px || *left_wall_px < *right_wall_px,
           "the left wall must lie left of the right wall");
   require(!floor_amplitude_m || positive(*floor_amplitude_m),

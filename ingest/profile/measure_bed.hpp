@@ -65,6 +65,9 @@ struct MeasureOptions {
   // Found on the beads' rims unless given (1 and 0: taken for plain); scale_m_per_px is that of rows.
   std::optional<double> pixel_aspect{};
   std::optional<double> lens_radial{};
+  // From which on the aspect is found: near the true one, where that is far from 1. Of a film, what it states if this
+  // is 1.
+  double first_pixel_aspect = 1;
   FindOptions find{};                            // polarity, radius, roi, ...
   std::shared_ptr<SearchedFrame> searched{};     // what a survey has learned of the first frame
   Kernel kernel = measuring_kernel;              // widths in D

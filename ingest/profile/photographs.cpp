@@ -8,6 +8,8 @@
 
 #include "ingest/find/learn_beads.hpp"
 #include "ingest/find/other_shade.hpp"
+#include "ingest/find/picture_maps.hpp"
+#include "ingest/find/rim_shape.hpp"
 #include "ingest/frames/background_level.hpp"
 #include "ingest/frames/picture_threads.hpp"
 #include "ingest/profile/bed_doubts.hpp"
@@ -86,13 +88,19 @@ SurveyOptions survey_options(const FindOptions& options) {
   return {.polarity = options.polarity, .radius_px = options.radius_px, .roi = options.roi};
 }
 
+double aspect_assumed(const MeasureOptions& options) {
+  return options.pixel_aspect.value_or(options.first_pixel_aspect);
+}
+
 // The frame lends its levels to the survey and has them back afterwards.
-Survey survey_of(GrayFrame& frame, const FindOptions& options) {
+Survey survey_of(GrayFrame& frame, const FindOptions& options, double pixel_aspect = 1) {
   ChannelFrames frames;
   frames.width = frame.width;
   frames.height = frame.height;
   frames.channels.push_back({Channel::automatic, std::move(frame)});
-  const Survey survey = take_survey(frames, survey_options(options));
+  ChannelFrames square;
+  if (pixel_aspect != 1) square = frames;
+  Survey survey = survey_with_square_pixels(pixel_aspect == 1 ? frames : square, survey_options(options), pixel_aspect);
   frame = std::move(frames.channels.front().frame);
   return survey;
 }
@@ -190,23 +198,41 @@ std::string_view to_string(FindStatus status) {
 }
 
 std::optional<FindOptions> search_after_survey(const MeasureOptions& measure) {
-  if (measure.scale_m_per_px || measure.second_diameter_m || measure.pixel_aspect || measure.lens_radial)
+  if (measure.scale_m_per_px || measure.second_diameter_m || measure.pixel_aspect || measure.lens_radial ||
+      measure.first_pixel_aspect != 1)
     return std::nullopt;
   return measure.find;
 }
 
+Survey survey_with_square_pixels(ChannelFrames& frames, SurveyOptions options, double pixel_aspect) {
+  if (pixel_aspect == 1) return take_survey(frames, options);
+  frames.width = static_cast<int>(std::lround(frames.width * pixel_aspect));
+  for (ChannelFrames::One& one : frames.channels) {
+    const double enlargement = one.frame.enlargement;
+    one.frame = LensMap({pixel_aspect, 0}, one.frame.width, one.frame.height).corrected(one.frame);
+    one.frame.enlargement = enlargement;
+  }
+  if (options.roi) options.roi = widened(*options.roi, pixel_aspect);
+  Survey survey = take_survey(frames, options);
+  for (SurveyCandidate& candidate : survey.candidates)
+    if (candidate.region) candidate.region = widened(*candidate.region, 1 / pixel_aspect);
+  return survey;
+}
+
 std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
-                                       const FrameSourceOptions& source) {
+                                       const FrameSourceOptions& source, double pixel_aspect) {
   for (std::size_t k = 0; k < std::min(pictures.size(), most_tried); ++k) {
     try {
-      const ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, surveyed_pixels, source);
+      ChannelFrames frames = read_channels(pictures[k].path, pictures[k].page, surveyed_pixels, source);
       const PictureThreads threads(threads_for(frames.width, frames.height));
+      Survey survey = survey_with_square_pixels(frames, options, pixel_aspect);
       FirstLook look{.path = pictures[k].path,
                      .width = frames.width,
                      .height = frames.height,
-                     .survey = take_survey(frames, options),
+                     .survey = std::move(survey),
                      .picture = nullptr,
-                     .page = pictures[k].page};
+                     .page = pictures[k].page,
+                     .pixel_aspect = pixel_aspect};
       if (source.channel == Channel::automatic) look.picture = std::make_shared<const CandidatePictures>(frames);
       return look;
     } catch (const InputError&) {
@@ -214,6 +240,25 @@ std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures,
     }
   }
   return std::nullopt;
+}
+
+std::optional<double> aspect_by_outlines(const FirstLook& look) {
+  constexpr double most_pixels = 2e7;
+  const SurveyCandidate& best = look.survey.candidates.front();
+  if (best.channel == Channel::grey_distance || static_cast<double>(look.width) * look.height > most_pixels)
+    return std::nullopt;
+  try {
+    FrameSourceOptions source;
+    source.channel = best.channel;
+    GrayFrame frame = read_frame(look.path, look.page, source);
+    if (look.pixel_aspect != 1) frame = LensMap({look.pixel_aspect, 0}, frame.width, frame.height).corrected(frame);
+    std::vector<Circle> circles;
+    for (const RimDisk& disk : best.disks) circles.push_back(disk.circle);
+    PictureMaps maps(frame, best.rims.search.wanted_px);
+    return look.pixel_aspect / axes_of(shared_second(shapes_of_rims(maps, best.rims, circles, circles)));
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 std::string why_not_scale(double bead_diameter_m, double scale_m_per_px, double radius_px) {
@@ -336,7 +381,11 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
     FrameSource names = FrameSource::open(paths, source);
     SurveyOptions asked = survey_options(options.find);
     asked.search = search_after_survey(options);
-    const auto look = look_at_first(names.first_origins(most_tried), asked, source);
+    const std::vector<FrameOrigin> pictures = names.first_origins(most_tried);
+    if (measure.first_pixel_aspect == 1 && !pictures.empty())
+      measure.first_pixel_aspect = stated_pixel_aspect(pictures.front().path);
+    if (aspect_assumed(measure) != 1) asked.search.reset();
+    const auto look = look_at_first(pictures, asked, source, aspect_assumed(measure));
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);
     if (look) {
@@ -370,7 +419,7 @@ BedFound measure_bed(const std::vector<ImageView>& images, const MeasureOptions&
   std::optional<BackgroundLevel> background;  // where the distance from it is searched
   if (!measure.find.seen) {
     GrayFrame first = frame_of(images.front());
-    const Survey survey = survey_of(first, options.find);
+    const Survey survey = survey_of(first, options.find, aspect_assumed(measure));
     if (!survey.found) return refused(FindStatus::no_beads, "no beads: " + survey.why_not);
     look_for(survey.candidates.front(), measure.find);
     region = survey.candidates.front().region;

@@ -65,6 +65,9 @@ struct FirstLook {
   Survey survey;
   std::shared_ptr<const CandidatePictures> picture;  // to draw candidates into; none where one channel was asked for
   std::size_t page = 0;                              // of a file with several pictures
+  // A pixel's width over its height, as assumed. The columns were made as many times as wide. So width, radii and places
+  // are those of the picture with square pixels. Regions are those of the picture as recorded.
+  double pixel_aspect = 1;
 };
 // What is searched for after a survey, for SurveyOptions::search. None where scale, second diameter or lens are given:
 // the search then differs from a survey's trial.
@@ -72,7 +75,14 @@ std::optional<FindOptions> search_after_survey(const MeasureOptions& measure);
 // The first `most_tried` of `pictures` are tried; nothing when none of them can be read.
 inline constexpr std::size_t most_tried = 10;
 std::optional<FirstLook> look_at_first(const std::vector<FrameOrigin>& pictures, const SurveyOptions& options,
-                                       const FrameSourceOptions& source = {});
+                                       const FrameSourceOptions& source = {}, double pixel_aspect = 1);
+// A survey of the picture with square pixels, which `frames` hold afterwards. Regions, asked for and found, are those
+// of the picture as recorded.
+Survey survey_with_square_pixels(ChannelFrames& frames, SurveyOptions options, double pixel_aspect);
+
+// The pixel_aspect of a look in which beads were found, corrected by how oval their outlines still are. Nothing where
+// they cannot be measured.
+std::optional<double> aspect_by_outlines(const FirstLook& look);
 
 // What a survey saw becomes what is searched for, and where.
 void look_for(const SurveyCandidate& best, FindOptions& find);

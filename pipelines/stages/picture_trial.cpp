@@ -65,16 +65,15 @@ FirstLook look_at_reduced(const ingest::FrameOrigin& picture, const ExtractOptio
                  .height = reduced.height,
                  .survey = {},
                  .picture = nullptr,
-                 .page = picture.page};
-  const ingest::SurveyOptions asked = survey_asked_for(options);
-  if (options.channel == BeadChannel::automatic) {
-    look.survey = ingest::take_survey(reduced, asked);
-  } else {
+                 .page = picture.page,
+                 .pixel_aspect = options.pixel_aspect.value_or(ingest::stated_pixel_aspect(picture.path))};
+  ingest::ChannelFrames frames = reduced;
+  if (options.channel != BeadChannel::automatic) {
     const ingest::Channel channel = channel_of(options.channel);
-    ingest::ChannelFrames one = reduced;
-    one.channels = {{channel, frame_in(reduced, channel)}};
-    look.survey = ingest::take_survey(one, asked);
+    frames.channels = {{channel, frame_in(reduced, channel)}};
   }
+  look.survey = ingest::survey_with_square_pixels(frames, survey_asked_for(options), look.pixel_aspect);
+  look.width = frames.width;
   return look;
 }
 
@@ -127,21 +126,22 @@ ingest::MeasureOptions asked_for(const ExtractOptions& options) {
 }
 
 void require_inside(const ExtractOptions& options, const FirstLook& look) {
+  const int width = static_cast<int>(std::lround(look.width / look.pixel_aspect));  // of the picture as recorded
   if (options.roi.size() == 4) {
     const double left = options.roi[0], top = options.roi[1], right = left + options.roi[2],
                  bottom = top + options.roi[3];
-    if (left >= look.width || top >= look.height || right <= 0 || bottom <= 0)
+    if (left >= width || top >= look.height || right <= 0 || bottom <= 0)
       throw StageError(fmt::format(
           "{}: the region of interest (--roi, \"roi\") lies outside the picture of {} x {} px. Give LEFT,TOP,WIDTH,"
           "HEIGHT inside it, or leave --roi out to search the whole picture",
-          look.path, look.width, look.height));
+          look.path, width, look.height));
   }
   if (!options.left_wall || !options.right_wall) return;
-  if (*options.left_wall >= look.width || *options.right_wall <= 0)
+  if (*options.left_wall >= width || *options.right_wall <= 0)
     throw StageError(fmt::format(
         "{}: the walls given at columns {:g} and {:g} enclose nothing of the picture, which is {} px wide. Correct "
         "--left-wall and --right-wall, or leave both out: they are then found",
-        look.path, *options.left_wall, *options.right_wall, look.width));
+        look.path, *options.left_wall, *options.right_wall, width));
 }
 
 const ingest::SurveyCandidate& chosen_of(const ingest::Survey& survey, const ExtractOptions& options) {
@@ -162,6 +162,7 @@ void go_on_with(const ingest::SurveyCandidate& chosen, const FirstLook& look, in
                 ingest::MeasureOptions& measure) {
   source.channel = chosen.channel;
   ingest::look_for(chosen, measure.find);
+  measure.first_pixel_aspect = look.pixel_aspect;
   source.reduction = measure.reduction = ingest::reduction_after(look, chosen);
   measure.searched = chosen.searched;
 }
@@ -204,10 +205,14 @@ std::optional<Trial> judged(const ExtractOptions& options, const ingest::Measure
     return std::nullopt;
   }
   if (found.disk_total == 0) return std::nullopt;
-  return Trial{
-      found.disk_total,     found.calibration.radius_px,  found.calibration.polarity == ingest::Polarity::bright_beads,
-      found.expected_wrong, found.finder.expected_missed, found.contacts,
-      circles_of(disks)};
+  return Trial{found.disk_total,
+               found.calibration.radius_px,
+               found.calibration.polarity == ingest::Polarity::bright_beads,
+               found.expected_wrong,
+               found.finder.expected_missed,
+               found.contacts,
+               circles_of(disks),
+               found.calibration.lens.pixel_aspect};
 }
 
 namespace {

@@ -45,6 +45,7 @@ struct Trial {
   double wrong = 0, missed = 0;  // shares that are expected, of the disks and of the beads
   ingest::Contacts contacts;
   ingest::SurveyCandidate found;  // the disks, to be drawn
+  double pixel_aspect = 1;        // as found, or as given
 };
 // Nothing where the run refuses it. `reduced`: the picture for a quick trial, which may be wrong.
 std::optional<Trial> try_options(const ingest::FrameOrigin& picture, const ExtractOptions& options,

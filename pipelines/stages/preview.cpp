@@ -129,13 +129,16 @@ std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& 
 }
 
 std::optional<FirstLook> look_at_first(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options,
-                                       LookFor purpose) {
+                                       LookFor purpose, std::optional<double> pixel_aspect) {
+  if (options.pixel_aspect) pixel_aspect = options.pixel_aspect;
+  if (!pixel_aspect) pixel_aspect = ingest::stated_pixel_aspect(pictures.front().path);
   ingest::SurveyOptions asked = survey_asked_for(options);
   asked.channel_alone = purpose == LookFor::preview;
-  if (purpose == LookFor::search && !options.reduction) asked.search = ingest::search_after_survey(asked_for(options));
+  if (purpose == LookFor::search && !options.reduction && *pixel_aspect == 1)
+    asked.search = ingest::search_after_survey(asked_for(options));
   ingest::FrameSourceOptions source;
   source.channel = channel_of(options.channel);
-  return ingest::look_at_first(pictures, asked, source);
+  return ingest::look_at_first(pictures, asked, source, *pixel_aspect);
 }
 
 std::string options_for(const ingest::SurveyCandidate& candidate) {
@@ -186,11 +189,12 @@ void write_preview(const std::filesystem::path& folder, const FirstLook& look, c
             "more thoroughly, so it may choose another one. The commands were not tried.</p>\n"
           : fmt::format("<p><b>No beads are found: {}.</b></p>\n", escaped(survey.why_not));
   const std::shared_ptr<const ingest::CandidatePictures> drawn =
-      look.picture ? look.picture : std::make_shared<const ingest::CandidatePictures>(look.path, look.page);
+      look.picture ? look.picture
+                   : std::make_shared<const ingest::CandidatePictures>(look.path, look.page, look.pixel_aspect);
   const ingest::CandidatePictures& pictures = *drawn;
   std::size_t number = 0;
   for (const Proposal& proposal : proposals) {
-    pictures.write(folder / fmt::format("preview_{}.png", ++number), &proposal.found);
+    pictures.write(folder / fmt::format("preview_{}.png", ++number), &proposal.found, proposal.bead_aspect);
     body += section_of(proposal, number, program + words_of(proposal.options));
   }
   for (const auto* candidate : different_candidates(survey)) {

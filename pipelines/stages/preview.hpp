@@ -31,11 +31,12 @@ std::vector<ingest::FrameOrigin> first_pictures(const std::vector<std::string>& 
                                                 const ingest::FrameSourceOptions& source);
 
 // The first readable one of the pictures, surveyed as the options ask. What only a run needs to know takes time.
-// `search`: the search of these pictures follows, and may begin with what the survey learns.
+// `search`: the search of these pictures follows, and may begin with what the survey learns. `pixel_aspect`: a pixel's
+// width over its height where the options do not give it; else what a film states.
 using ingest::FirstLook;
 enum class LookFor { run, search, preview };
 std::optional<FirstLook> look_at_first(const std::vector<ingest::FrameOrigin>& pictures, const ExtractOptions& options,
-                                       LookFor purpose = LookFor::run);
+                                       LookFor purpose = LookFor::run, std::optional<double> pixel_aspect = {});
 
 // A change of the options with which the picture was measured, and not refused (proposals.hpp).
 struct Proposal {
@@ -44,7 +45,8 @@ struct Proposal {
   std::string when;                    // condition of it, " where neighbouring beads touch"; may be empty
   std::string seen;                    // "63 dark beads of 9.9 px radius"
   ExtractOptions options;              // all that were tried
-  ingest::SurveyCandidate found;       // the disks, to be drawn
+  ingest::SurveyCandidate found;       // the disks, to be drawn into the picture of the first look
+  double bead_aspect = 1;              // width over height of a bead in that picture
 };
 
 // preview.html and preview_1.png .. preview_3.png in `folder`. `files` are those of the command line. The commands

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "ingest/find/nearby.hpp"
+#include "ingest/find/round_aspect.hpp"
 #include "ingest/profile/photographs.hpp"
 
 namespace shakebed::pipelines {
@@ -30,6 +31,10 @@ constexpr std::size_t fewest_of_region = 3;     // circles that a region of thei
 constexpr double sure = 0.5;                    // probability of a circle that the region must hold
 constexpr double neighbours_radii = 20;         // between the centres of circles of one region
 constexpr double margin_radii = 2.5;            // around the centres: a bead and the light beside it
+
+// Rounds in which outlines correct an aspect of pixels, and corrections of it that are small.
+constexpr int rounds_of_aspect = 2;
+constexpr double near_aspect = 0.01;
 
 // The options that restrict what is found.
 void leave_out(const std::string& name, ExtractOptions& options) {
@@ -77,7 +82,7 @@ std::optional<ingest::PixelRectangle> region_of(const ingest::SurveyCandidate& c
   const auto largest = std::max_element(size.begin(), size.end());
   if (largest == size.end() || *largest < fewest_of_region) return std::nullopt;
   const auto of_region = static_cast<std::size_t>(largest - size.begin());
-  double left = look.width, top = look.height, right = 0, bottom = 0;
+  double left = look.width, top = look.height, right = 0, bottom = 0;  // with square pixels
   const double margin = margin_radii * candidate.rims.radius_px;
   for (std::size_t k = 0; k < circles.size(); ++k) {
     if (root(k) != of_region) continue;
@@ -89,7 +94,7 @@ std::optional<ingest::PixelRectangle> region_of(const ingest::SurveyCandidate& c
   region.top = static_cast<int>(std::max(0.0, std::floor(top)));
   region.width = static_cast<int>(std::min<double>(look.width, std::ceil(right))) - region.left;
   region.height = static_cast<int>(std::min<double>(look.height, std::ceil(bottom))) - region.top;
-  return region;
+  return ingest::widened(region, 1 / look.pixel_aspect);
 }
 
 class Proposer {
@@ -99,6 +104,7 @@ class Proposer {
 
   std::vector<Proposal> find() {
     leave_out_what_excludes_beads();
+    if (proposals_.empty()) give_shape_of_pixels();
     if (proposals_.empty()) give_what_candidates_need();
     if (refused_ == RefusedBy::measurement && (proposals_.empty() || apart())) accept_what_was_found();
     return std::move(proposals_);
@@ -117,6 +123,48 @@ class Proposer {
     propose(restricting, "", [&](ExtractOptions& o) {
       for (const std::string& name : restricting) leave_out(name, o);
     });
+  }
+
+  // Disks look oval where pixels are not square. First all edges tell the aspect, then the outlines of the disks found,
+  // and then the search finds what is left, where it goes by faces.
+  void give_shape_of_pixels() {
+    if (refused_ == RefusedBy::measurement || options_.pixel_aspect) return;
+    const std::optional<double> aspect = other_aspect_seen();
+    if (!aspect) return;
+    std::optional<FirstLook> look = look_at_first({origin()}, options_, LookFor::run, aspect);
+    if (look && !look->survey.found)  // of small beads that touch, blur hides half of the deviation
+      if (const double twice = *aspect * *aspect / look_.pixel_aspect; is_possible(twice))
+        look = look_at_first({origin()}, options_, LookFor::run, twice);
+    for (int round = 0; round < rounds_of_aspect && look && look->survey.found; ++round) {
+      const std::optional<double> better = ingest::aspect_by_outlines(*look);
+      if (!better || std::abs(std::log(*better / look->pixel_aspect)) < near_aspect) break;
+      look = look_at_first({origin()}, options_, LookFor::run, better);
+    }
+    if (!look || !look->survey.found) return;
+    ++searches_;
+    const std::optional<Trial> trial = try_after_look(*look, options_, TrialSearch::as_the_run);
+    if (!trial) return;
+    constexpr double digits = 1e4;  // as they are proposed
+    ExtractOptions options = options_;
+    options.pixel_aspect = std::round(digits * trial->pixel_aspect) / digits;
+    std::string give = fmt::format("--pixel-aspect {:g}", *options.pixel_aspect);
+    add(std::move(options), *trial, {}, std::move(give));
+  }
+
+  static bool is_possible(double aspect) { return aspect >= ingest::narrowest_pixel && aspect <= ingest::widest_pixel; }
+
+  // If it is clearly not that of the first look.
+  [[nodiscard]] std::optional<double> other_aspect_seen() const {
+    constexpr double clearly = 0.06;
+    constexpr std::size_t enough_pixels = 2'000'000;
+    try {
+      const ingest::ChannelFrames frames = ingest::read_channels(look_.path, look_.page, enough_pixels);
+      const std::optional<double> aspect = ingest::aspect_for_round_outlines(frames.channels.front().frame);
+      const bool clear = aspect && std::abs(std::log(*aspect / look_.pixel_aspect)) > clearly;
+      return clear && is_possible(*aspect) ? aspect : std::nullopt;
+    } catch (const ingest::InputError&) {
+      return std::nullopt;
+    }
   }
 
   void give_what_candidates_need() {
@@ -228,6 +276,9 @@ class Proposer {
     proposal.leave_out = std::move(without);
     proposal.give = std::move(give);
     proposal.found = trial.found;
+    for (ingest::RimDisk& disk : proposal.found.disks)  // in the picture of the first look
+      disk.circle.x = (disk.circle.x + 0.5) * look_.pixel_aspect - 0.5;
+    proposal.bead_aspect = look_.pixel_aspect / trial.pixel_aspect;
     proposal.seen = fmt::format("{} {} bead{} of {:.1f} px radius", trial.beads, trial.bright ? "bright" : "dark",
                                 trial.beads == 1 ? "" : "s", trial.radius_px);
     proposals_.push_back(std::move(proposal));

@@ -296,7 +296,8 @@ def measure_bed(
         floor_slope : float
             Slope of the floor, in pixels down per pixel to the right.
         pixel_aspect : float
-            Ratio of the width of a pixel to its height.
+            Ratio of the width of a pixel to its height. If left out, it is found from the rims of the beads, up to
+            8 % from what a film states, else from 1.
         lens_radial : float
             Distortion of the lens: outward shift of the corners, in half diagonals.
         kernel : str

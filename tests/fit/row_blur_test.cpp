@@ -78,6 +78,22 @@ TEST(RowBlur, KeepsAStraightLineAtUnevenHeights) {
     EXPECT_NEAR(blurred.profile.number_density[i] / profile.number_density[i], 1, 0.01) << i;
 }
 
+// The last height owns as much above it as below, and the one before it half of both of its spacings.
+TEST(RowBlur, SharesOutTheLastHeights) {
+  Profile profile = flat(40, 0.05, 0.1);
+  profile.height.back() += 0.1;
+  const BlurredProfile blurred = blur_rows(profile, {}, 0.0);
+  for (std::size_t i = 35; i < 40; ++i) {
+    double expected = 0;
+    for (std::size_t j = 0; j < 40; ++j) {
+      const double away = (profile.height[i] - profile.height[j]) / 0.5;
+      const double owned = j == 39 ? 0.2 : j == 38 ? 0.15 : 0.1;
+      expected += 0.7 * owned * std::exp(-away * away / 2) / (0.5 * std::sqrt(2 * std::numbers::pi));
+    }
+    EXPECT_NEAR(blurred.profile.number_density[i], expected, 1e-5) << i;
+  }
+}
+
 // Samples behind a covariance stay; errors of single heights count as of as many samples as there are heights. What is
 // common to all heights stays common to them.
 TEST(RowBlur, KeepsTheSamplesOfACovariance) {

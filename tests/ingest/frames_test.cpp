@@ -347,6 +347,21 @@ TEST_P(Films, FrameKIsTheKthPicture) {
   EXPECT_THROW(read_frame(path, count), InputError);
 }
 
+TEST(StatedPixelAspect, IsThatOfAFilm) {
+  const ScratchFolder folder;
+  const std::string path = folder / "film.mp4";
+  if (!write_film(path, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 3)) GTEST_SKIP() << "this OpenCV cannot write mp4";
+  EXPECT_EQ(stated_pixel_aspect(path), 1);
+  test::state_pixel_aspect(path, 64, 45);
+  EXPECT_EQ(stated_pixel_aspect(path), 64.0 / 45);
+  FrameSource source = FrameSource::open({path});
+  EXPECT_EQ(number_in(*source.next()), 0U) << "the pictures are as before";
+  std::ofstream(folder / "broken.mp4") << "no film";
+  EXPECT_EQ(stated_pixel_aspect(folder / "broken.mp4"), 1);
+  write_png(folder / "picture.png", ramp(8, 8, 5));
+  EXPECT_EQ(stated_pixel_aspect(folder / "picture.png"), 1);
+}
+
 TEST_P(Films, StrideStepsOverPicturesExactly) {
   const ScratchFolder folder;
   const auto& [ending, code] = GetParam();

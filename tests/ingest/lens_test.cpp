@@ -5,11 +5,17 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <optional>
 #include <stdexcept>
 
+#include "ingest/find/round_aspect.hpp"
 #include "ingest/profile/measure_bed.hpp"
+#include "ingest/profile/photographs.hpp"
 #include "ingest/synthetic/random_stream.hpp"
 #include "ingest/synthetic/synthetic_frames.hpp"
+#include "tests/ingest/test_files.hpp"
 
 namespace shakebed::ingest {
 namespace {
@@ -303,6 +309,139 @@ TEST(Lens, HasTheErrorsOfBeadsThatDiffer) {
 TEST(Lens, IsNotSeenInTheSidesOfThickDisks) {
   const Lens lens = found_in(seen_by({.depth = 0.02}, bed(320, 300), 320, 300));
   EXPECT_EQ(lens.radial, 0);
+}
+
+// Pixels of films for wide screens. A picture of 320 true pixels' width.
+struct WideScreen {
+  double aspect;
+  int width = static_cast<int>(std::lround(320 / aspect));
+  std::vector<RenderedDisk> truth = bed(width * aspect, 300);
+  GrayFrame frame = seen_by({aspect, 0}, truth, width, 300);
+
+  [[nodiscard]] BedFound measured(MeasureOptions options) const {
+    options.bead_diameter_m = 16e-3;
+    return measure_bed({{width, 300, frame.pixels.data(), PixelType::f32}}, options);
+  }
+  // Greatest distance from the true centres, true px; none where a disk is missing or too many are found.
+  [[nodiscard]] std::optional<double> off(const BedFound& found, double from_px = 0, double to_px = 1e9) const {
+    double farthest = 0;
+    std::size_t expected = 0;
+    for (const RenderedDisk& disk : truth) {
+      const double x_px = (disk.x_px + 0.5) / aspect - 0.5;
+      if (x_px < from_px || x_px > to_px) continue;
+      ++expected;
+      double nearest = 1e9;
+      for (const MeasuredDisk& one : found.measurement.disks)
+        nearest = std::min(nearest, std::hypot((one.x_px - x_px) * aspect, one.y_px - disk.y_px));
+      farthest = std::max(farthest, nearest);
+    }
+    return found.measurement.disks.size() == expected ? std::optional(farthest) : std::nullopt;
+  }
+};
+
+class WideScreens : public testing::TestWithParam<double> {};
+
+TEST_P(WideScreens, AreMeasuredWithTheAspectOfTheirPixels) {
+  const WideScreen screen{GetParam()};
+  MeasureOptions options;
+  EXPECT_EQ(screen.measured(options).status, FindStatus::no_beads) << "ovals";
+  options.pixel_aspect = screen.aspect;
+  const BedFound found = screen.measured(options);
+  ASSERT_TRUE(found.ok()) << found.message;
+  const std::optional<double> off = screen.off(found);
+  ASSERT_TRUE(off);
+  EXPECT_LT(*off, 0.3);
+  EXPECT_NEAR(found.measurement.calibration.radius_px, 8, 0.05);
+}
+
+// A search that begins 4 % off ends at the true aspect.
+TEST_P(WideScreens, AreCorrectedFromNearby) {
+  const WideScreen screen{GetParam()};
+  MeasureOptions options;
+  options.first_pixel_aspect = 1.04 * screen.aspect;
+  const BedFound found = screen.measured(options);
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_NEAR(found.measurement.calibration.lens.pixel_aspect / screen.aspect, 1, 0.0025);
+  ASSERT_TRUE(screen.off(found));
+  EXPECT_LT(*screen.off(found), 0.3);
+}
+
+// Regions are those of the picture as recorded: of what lies in the left half all is found, and nothing beside it.
+TEST_P(WideScreens, HaveRegionsOfThePictureAsRecorded) {
+  const WideScreen screen{GetParam()};
+  MeasureOptions options;
+  options.pixel_aspect = screen.aspect;
+  const int half = screen.width / 2;
+  options.find.roi = PixelRectangle{0, 0, half, 300};
+  const BedFound found = screen.measured(options);
+  ASSERT_TRUE(found.ok()) << found.message;
+  const double radius = 8 / screen.aspect;
+  double right = 0;
+  for (const MeasuredDisk& one : found.measurement.disks) right = std::max(right, one.x_px);
+  EXPECT_LT(right, half + 0.5);
+  EXPECT_GT(right, half - 2 * radius);
+  std::size_t inside = 0, seen = 0;
+  for (const RenderedDisk& disk : screen.truth) {
+    const double x_px = (disk.x_px + 0.5) / screen.aspect - 0.5;
+    if (x_px > half - 1.2 * radius) continue;
+    ++inside;
+    for (const MeasuredDisk& one : found.measurement.disks)
+      seen += std::hypot((one.x_px - x_px) * screen.aspect, one.y_px - disk.y_px) < 1;
+  }
+  EXPECT_EQ(seen, inside);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lens, WideScreens, testing::Values(64.0 / 45, 1.333, 0.75));
+
+TEST(Lens, BeginsWithWhatAFilmStates) {
+  const test::ScratchFolder folder;
+  const WideScreen screen{1.25};
+  const std::string path = folder / "film.mp4";
+  {
+    cv::Mat grey, colour;
+    cv::Mat(300, screen.width, CV_32F, const_cast<float*>(screen.frame.pixels.data())).convertTo(grey, CV_8U);
+    cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
+    cv::VideoWriter film(path, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25, colour.size());
+    if (!film.isOpened()) GTEST_SKIP() << "this OpenCV cannot write mp4";
+    film.write(colour);
+  }
+  MeasureOptions options;
+  options.bead_diameter_m = 16e-3;
+  EXPECT_EQ(measure_bed({path}, options).status, FindStatus::no_beads) << "ovals";
+  test::state_pixel_aspect(path, 6, 5);  // nearly right
+  const BedFound found = measure_bed({path}, options);
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_NEAR(found.measurement.calibration.lens.pixel_aspect, 1.25, 0.006);
+  EXPECT_TRUE(screen.off(found));
+}
+
+// The directions of edges tell an aspect of pixels to a few per cent, of any camera.
+TEST(RoundAspect, IsThatOfPixelsThatShowDisks) {
+  for (const double aspect : {0.55, 0.75, 1.0, 1.3, 1.8}) {
+    const WideScreen screen{aspect};
+    const std::optional<double> seen = aspect_for_round_outlines(screen.frame);
+    ASSERT_TRUE(seen) << aspect;
+    EXPECT_NEAR(*seen / aspect, 1, 0.05) << aspect;
+  }
+}
+
+// Squares whose sides run along rows and columns have edges of two directions, as text and plots do; turned by an
+// eighth of a turn, too.
+TEST(RoundAspect, IsNoneOfStraightLines) {
+  EXPECT_FALSE(aspect_for_round_outlines({}));
+  GrayFrame frame{200, 160, std::vector<float>(32'000, 90.0F)};
+  EXPECT_FALSE(aspect_for_round_outlines(frame)) << "no edges";
+  const auto tiled = [&](const auto& is_dark) {
+    for (int row = 0; row < 160; ++row)
+      for (int column = 0; column < 200; ++column)
+        frame.pixels[static_cast<std::size_t>(row * 200 + column)] = is_dark(column, row) ? 60.0F : 180.0F;
+    return frame;
+  };
+  EXPECT_FALSE(aspect_for_round_outlines(tiled([](int x, int y) { return x % 20 < 10 && y % 20 < 10; })));
+  EXPECT_FALSE(
+      aspect_for_round_outlines(tiled([](int x, int y) { return (x + y) % 28 < 14 && (x - y + 200) % 28 < 14; })));
+  EXPECT_FALSE(aspect_for_round_outlines(tiled([](int x, int y) { return (x + y) % 28 < 14; }))) << "slanted stripes";
+  EXPECT_FALSE(aspect_for_round_outlines(tiled([](int x, int) { return x % 20 < 10; }))) << "columns";
 }
 
 }  // namespace

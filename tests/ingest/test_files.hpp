@@ -34,6 +34,36 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
+// Makes an mp4 film of OpenCV state that its pixels are `width` : `height`. Its boxes (four bytes of length, four of
+// name) are stored one in another; that of the pixels is put at the end of the one that describes the pictures.
+inline void state_pixel_aspect(const std::string& film, unsigned width, unsigned height) {
+  std::ostringstream whole;
+  whole << std::ifstream(film, std::ios::binary).rdbuf();
+  std::string bytes = whole.str();
+  const auto put = [](unsigned number) {
+    std::string four;
+    for (const int shift : {24, 16, 8, 0}) four += static_cast<char>(number >> shift & 255U);
+    return four;
+  };
+  const auto number_at = [&](std::size_t place) {
+    unsigned number = 0;
+    for (std::size_t k = 0; k < 4; ++k) number = number << 8 | static_cast<unsigned char>(bytes[place + k]);
+    return number;
+  };
+  std::vector<std::size_t> around;
+  std::size_t at = 0;
+  for (const char* name : {"moov", "trak", "mdia", "minf", "stbl", "stsd"}) {
+    while (bytes.compare(at + 4, 4, name) != 0) at += number_at(at);
+    around.push_back(at);
+    at += 8;
+  }
+  at += 8;  // version, and the number of descriptions
+  around.push_back(at);
+  bytes.insert(at + number_at(at), put(16) + "pasp" + put(width) + put(height));
+  for (const std::size_t box : around) bytes.replace(box, 4, put(number_at(box) + 16));
+  std::ofstream(film, std::ios::binary) << bytes;
+}
+
 // The folder of real images: SHAKEBED_IMAGES, else `shared/images` beside the checkout. Empty when absent.
 inline std::filesystem::path real_images() {
   if (const char* given = std::getenv("SHAKEBED_IMAGES")) return given;

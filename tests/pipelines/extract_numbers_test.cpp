@@ -431,6 +431,45 @@ TEST(PictureTrial, OnAReducedPictureFindsTheSameBeads) {
   EXPECT_FALSE(try_options({path}, options, &*reduced)) << "no bead lies there";
 }
 
+// Disks that a film for wide screens shows as ovals, half as high again as wide: what is proposed is the aspect of its
+// pixels, and leads to all of them. Of beads that touch and are 13 px wide, blur makes it wrong by up to 2 %.
+TEST(PictureTrial, FindsTheShapeOfPixels) {
+  constexpr double radius = 10, aspect = 1.5;  // true px
+  const std::vector<Place> places = lattice(radius, 7, 12, 470, 270, 0.05);
+  const auto cover = [&](double x, double y) {
+    double farthest_in = 0;
+    for (const Place& place : places) {
+      const double dx = (x + 0.5) * aspect - 0.5 - place.x, dy = y - place.y, away = std::hypot(dx, dy);
+      if (away > radius + 2) continue;
+      const double px = away > 0 ? std::hypot(dx / aspect, dy) / away : 1;  // recorded px a true one, this way
+      farthest_in = std::max(farthest_in, (radius - away) * px + 0.5);
+    }
+    return farthest_in;
+  };
+  const std::string path = (std::filesystem::path(testing::TempDir()) / "wide_screen.pgm").string();
+  write_text(path, PaintedPicture(320, 300).paint(cover, 60).blur(0.7).noise(2).pgm());
+  ExtractOptions options = some_options();
+  options.bead_number.reset();
+  const std::optional<FirstLook> look = look_at_first({{path}}, options);
+  ASSERT_TRUE(look);
+  EXPECT_FALSE(look->survey.found);
+  const std::vector<Proposal> proposals = proposals_for(*look, options, RefusedBy::first_look);
+  ASSERT_EQ(proposals.size(), 1U);
+  ASSERT_TRUE(proposals[0].options.pixel_aspect);
+  EXPECT_NEAR(*proposals[0].options.pixel_aspect / aspect, 1, 0.02);
+  ASSERT_EQ(proposals[0].give.rfind("--pixel-aspect ", 0), 0U);
+  EXPECT_EQ(std::stod(proposals[0].give.substr(15)), *proposals[0].options.pixel_aspect);
+  EXPECT_NEAR(proposals[0].bead_aspect * aspect, 1, 0.02);
+  const std::optional<FirstLook> square = look_at_first({{path}}, proposals[0].options);
+  ASSERT_TRUE(square && square->survey.found);
+  EXPECT_EQ(square->width, std::lround(320 * *proposals[0].options.pixel_aspect));
+  EXPECT_NEAR(*ingest::aspect_by_outlines(*square) / aspect, 1, 0.02);
+  const std::optional<Trial> trial = try_options({path}, proposals[0].options);
+  ASSERT_TRUE(trial);
+  EXPECT_EQ(trial->beads, places.size());
+  EXPECT_NEAR(trial->radius_px, radius, 0.2);
+}
+
 // Disks two diameters apart are refused. Searching is counted by how often it asks whether to stop: what was found is
 // not searched for again, and the whole takes less than two searches of the picture. It took three and more.
 TEST(PictureTrial, OfWhatWasMeasuredIsNoSearch) {
