@@ -882,6 +882,8 @@ TEST(LibraryByHand, OfStraightLinesIsExact) {
   EXPECT_NEAR(poor.chi2, chi2, 1e-4);
   EXPECT_NEAR(std::log(poor.temperature.value / 1.2), along / squares, 1e-6);
   EXPECT_NEAR(poor.temperature.std_error, poor.temperature.value * std::sinh(std::sqrt(chi2 / 5) * sigma), 1e-4);
+  EXPECT_NEAR(std::log(poor.interval.high / poor.temperature.value), 1.959964 * std::sqrt(chi2 / 5) * sigma, 1e-5);
+  EXPECT_NEAR(std::log(poor.interval.low / poor.temperature.value), -1.959964 * std::sqrt(chi2 / 5) * sigma, 1e-5);
   EXPECT_THAT(poor.warnings, ElementsAre(HasSubstr("no bed of the library describes the data")));
 }
 

@@ -90,7 +90,7 @@ TEST(RowBlur, SharesOutTheLastHeights) {
       const double owned = j == 39 ? 0.2 : j == 38 ? 0.15 : 0.1;
       expected += 0.7 * owned * std::exp(-away * away / 2) / (0.5 * std::sqrt(2 * std::numbers::pi));
     }
-    EXPECT_NEAR(blurred.profile.number_density[i], expected, 1e-5) << i;
+    EXPECT_NEAR(blurred.profile.number_density[i], expected, 3e-5) << i;  // the blur ends at 4 widths
   }
 }
 

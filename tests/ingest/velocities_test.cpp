@@ -307,6 +307,37 @@ TEST(Velocities, AreCorrectedByTheCorrelationOfTheirSteps) {
   EXPECT_EQ(measure_velocities(few, {.frame_rate_hz = 100}).horizontal.finite_time_factor, 1);
 }
 
+// A long film is measured in stretches, here of three frames. Two stretches of the same steps scatter by nothing: the
+// error is that of the correction alone.
+TEST(Velocities, OfALongFilmHaveTheErrorOfTheirCorrection) {
+  Measurement film = film_of_steps();
+  add_fours(film, 8, 4.5, 0.1, correlation_after(0.8), correlation_after(0.3));
+  in_order_of_frames(film);
+  const std::size_t count = film.disks.size() / 3;
+  const auto frame = [&](std::size_t which) {
+    std::vector<MeasuredDisk> disks;
+    for (std::size_t k = 0; k < count; ++k) {
+      MeasuredDisk disk = film.disks[which % 2 * count + k];
+      const MeasuredDisk &start = film.disks[k], &end = film.disks[2 * count + k];
+      const double times = static_cast<double>(which / 2);  // the same steps again, from where they ended
+      disk.radius_px = 10;
+      disk.x += times * (end.x - start.x), disk.z += times * (end.z - start.z);
+      disks.push_back(disk);
+    }
+    return disks;
+  };
+  VelocityMeter meter(2e-3, {.frame_rate_hz = 100}, 3);
+  for (std::size_t which = 0; which < 5; ++which) meter.add(frame(which));
+  const VelocityMeasurement all = meter.result(), one = measure_velocities(film, {.frame_rate_hz = 100});
+  EXPECT_EQ(all.links, 2 * one.links);
+  for (const auto component : {&VelocityMeasurement::horizontal, &VelocityMeasurement::vertical}) {
+    const KineticTemperature &whole = all.*component, &part = one.*component;
+    EXPECT_NEAR(whole.over_mg_m / part.over_mg_m, 1, 1e-9);
+    EXPECT_GT(part.finite_time_error, 0.05);
+    EXPECT_NEAR(whole.std_error_m / (part.finite_time_error * part.over_mg_m), 1, 1e-9);
+  }
+}
+
 // Two heights of different correlations: each has its own correction as far as the two differ by more than chance, and
 // what that changes is a part of the error.
 TEST(Velocities, OfEachHeightHaveTheirOwnCorrection) {

@@ -52,7 +52,8 @@ TEST_F(ClaimsVerdicts, OfANumberWhoseErrorIsNotKnownAreOpen) {
   EXPECT_EQ(verdict("/bed/range", R"("value": 5, "tolerance": 0.5)"), "open");
 }
 
-// 1.0 +- 0.1 over 0.25 without an error: 4 +- 0.4; over itself: 1 +- 0.1 sqrt(2), its errors taken as independent.
+// 1.0 +- 0.1 over 0.25 without an error: 4 +- 0.4; over itself: 1 +- 0.1 sqrt(2), its errors taken as independent. 0.25
+// over 1.0 +- 0.1 is 0.25 +- 0.025.
 TEST_F(ClaimsVerdicts, OfOneNumberOverAnother) {
   const Json quarter = one("/bed/t", R"("over": "/bed/plain", "value": 4, "tolerance": 0.8)");
   EXPECT_NEAR(quarter["value"].get<double>(), 4, 1e-14);
@@ -60,6 +61,9 @@ TEST_F(ClaimsVerdicts, OfOneNumberOverAnother) {
   EXPECT_EQ(quarter["verdict"], "holds");
   EXPECT_EQ(quarter["over"], "/bed/plain");
   EXPECT_NEAR(one("/bed/t", R"("over": "/bed/t", "value": 1)")["std_error"].get<double>(), 0.1 * std::sqrt(2), 1e-14);
+  const Json inverse = one("/bed/plain", R"("over": "/bed/t", "value": 1)");
+  EXPECT_NEAR(inverse["value"].get<double>(), 0.25, 1e-14);
+  EXPECT_NEAR(inverse["std_error"].get<double>(), 0.025, 1e-14);
   EXPECT_EQ(verdict("/bed/t", R"("over": "/bed/no", "value": 1)"), "not measured") << "over zero";
 }
 
