@@ -119,7 +119,7 @@ TEST(CandidatePicture, OfAFileIsThatOfItsPage) {
   ASSERT_TRUE(cv::imwritemulti(folder / "two.tif", pages));
   EXPECT_EQ(candidate_drawn(CandidatePictures(folder / "two.tif", 1), nullptr).at<cv::Vec3b>(5, 5),
             cv::Vec3b(10, 120, 230));
-  EXPECT_EQ(candidate_drawn(CandidatePictures(folder / "two.tif", 1, 8), nullptr).size(), cv::Size(8, 6));
+  EXPECT_EQ(candidate_drawn(CandidatePictures(folder / "two.tif", 1, 1, 8), nullptr).size(), cv::Size(8, 6));
   EXPECT_THROW(CandidatePictures(folder / "none.png"), InputError);
 }
 
