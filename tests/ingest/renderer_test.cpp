@@ -54,9 +54,9 @@ TEST(DrawnBeds, AreJitteredWhereThereIsRoom) {
     ASSERT_EQ(row.size(), 10U);
     ASSERT_EQ(jittered.size(), 10U);
     for (std::size_t k = 0; k < row.size(); ++k) {
-      const double right = jittered[k].x_px - row[k].x_px, down = jittered[k].y_px - row[k].y_px;
-      (k == 9 ? last : others) += right != 0 || down != 0;
-      EXPECT_LT(std::hypot(right, down), 5 * bed.jitter_px);
+      const double aside = jittered[k].x_px - row[k].x_px, down = jittered[k].y_px - row[k].y_px;
+      (k == 9 ? last : others) += aside != 0 || down != 0;
+      EXPECT_LT(std::hypot(aside, down), 5 * bed.jitter_px);
       EXPECT_LE(down, 0);
       if (k > 0) {
         EXPECT_GE(std::hypot(jittered[k].x_px - jittered[k - 1].x_px, jittered[k].y_px - jittered[k - 1].y_px),
