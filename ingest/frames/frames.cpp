@@ -341,7 +341,7 @@ double stated_pixel_aspect(const std::string& path) {
   if (kind_of(path) != Kind::film) return 1;
   try {
     const double aspect = Film(path, {}).pixel_aspect();
-    if (std::isfinite(aspect) && aspect > 0) return aspect;
+    if (aspect >= narrowest_pixel && aspect <= widest_pixel) return aspect;
   } catch (const InputError&) {
     // Reading the film says why.
   }

@@ -135,7 +135,9 @@ class FrameSource {
   std::unique_ptr<State> state_;
 };
 
-// Width over height of a pixel, as a film states it; 1 where it states none, and for image files.
+// Width over height of a pixel, at the limits of what is corrected.
+inline constexpr double narrowest_pixel = 0.5, widest_pixel = 2;
+// As a film states it. 1 where it states none, or one beyond these limits, and for image files.
 double stated_pixel_aspect(const std::string& path);
 
 // The page-th picture of an image file, or the page-th frame of a film. Throws InputError.

@@ -21,9 +21,6 @@ struct Lens {
   [[nodiscard]] bool plain() const { return pixel_aspect == 1 && radial == 0; }
 };
 
-// Width over height of a pixel.
-inline constexpr double narrowest_pixel = 0.5, widest_pixel = 2;
-
 struct PixelPlace {
   double x = 0, y = 0;
 };

@@ -65,8 +65,8 @@ struct FirstLook {
   Survey survey;
   std::shared_ptr<const CandidatePictures> picture;  // to draw candidates into; none where one channel was asked for
   std::size_t page = 0;                              // of a file with several pictures
-  // A pixel's width over its height, as assumed. The columns were made as many times as wide. So width, radii and places
-  // are those of the picture with square pixels. Regions are those of the picture as recorded.
+  // A pixel's width over its height, as assumed. The columns were made as many times as wide. So width, radii and
+  // places are those of the picture with square pixels. Regions are those of the picture as recorded.
   double pixel_aspect = 1;
 };
 // What is searched for after a survey, for SurveyOptions::search. None where scale, second diameter or lens are given:

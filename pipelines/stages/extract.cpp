@@ -43,8 +43,7 @@ void describe_geometry(Fields& fields, ExtractOptions& o) {
                  {.help = "region of interest, in pixels: left, top, width, height; empty: the whole frame"});
   fields.number("pixel_aspect", o.pixel_aspect,
                 {.help = "ratio of the width of a pixel to its height; default: found from the rims of the beads, "
-                         "beginning with what a "
-                         "film states, else with 1",
+                         "beginning with what a film states, else with 1",
                  .range = from_to(0.5, 2)});
   fields.number("lens", o.lens_radial,
                 {.help = "distortion of the lens: true outward shift of the corners of the frame, in half diagonals "

@@ -128,27 +128,30 @@ class Proposer {
   // Disks look oval where pixels are not square. First all edges tell the aspect, then the outlines of the disks found,
   // and then the search finds what is left, where it goes by faces.
   void give_shape_of_pixels() {
-    if (refused_ == RefusedBy::measurement || options_.pixel_aspect) return;
+    if (refused_ == RefusedBy::measurement) return;
     const std::optional<double> aspect = other_aspect_seen();
     if (!aspect) return;
-    std::optional<FirstLook> look = look_at_first({origin()}, options_, LookFor::run, aspect);
+    ExtractOptions options = options_;
+    options.pixel_aspect.reset();
+    const auto look_with = [&](double one) { return look_at_first({origin()}, options, LookFor::run, one); };
+    std::optional<FirstLook> look = look_with(*aspect);
     if (look && !look->survey.found)  // of small beads that touch, blur hides half of the deviation
-      if (const double twice = *aspect * *aspect / look_.pixel_aspect; is_possible(twice))
-        look = look_at_first({origin()}, options_, LookFor::run, twice);
+      if (const double twice = *aspect * *aspect / look_.pixel_aspect; is_possible(twice)) look = look_with(twice);
     for (int round = 0; round < rounds_of_aspect && look && look->survey.found; ++round) {
       const std::optional<double> better = ingest::aspect_by_outlines(*look);
-      if (!better || std::abs(std::log(*better / look->pixel_aspect)) < near_aspect) break;
-      look = look_at_first({origin()}, options_, LookFor::run, better);
+      if (!better || std::abs(std::log(*better / look->pixel_aspect)) < near_aspect || !is_possible(*better)) break;
+      look = look_with(*better);
     }
     if (!look || !look->survey.found) return;
     ++searches_;
-    const std::optional<Trial> trial = try_after_look(*look, options_, TrialSearch::as_the_run);
+    const std::optional<Trial> trial = try_after_look(*look, options, TrialSearch::as_the_run);
     if (!trial) return;
     constexpr double digits = 1e4;  // as they are proposed
-    ExtractOptions options = options_;
     options.pixel_aspect = std::round(digits * trial->pixel_aspect) / digits;
     std::string give = fmt::format("--pixel-aspect {:g}", *options.pixel_aspect);
-    add(std::move(options), *trial, {}, std::move(give));
+    std::vector<std::string> instead_of;
+    if (options_.pixel_aspect) instead_of.emplace_back("--pixel-aspect");
+    add(std::move(options), *trial, std::move(instead_of), std::move(give));
   }
 
   static bool is_possible(double aspect) { return aspect >= ingest::narrowest_pixel && aspect <= ingest::widest_pixel; }

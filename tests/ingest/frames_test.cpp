@@ -354,6 +354,10 @@ TEST(StatedPixelAspect, IsThatOfAFilm) {
   EXPECT_EQ(stated_pixel_aspect(path), 1);
   test::state_pixel_aspect(path, 64, 45);
   EXPECT_EQ(stated_pixel_aspect(path), 64.0 / 45);
+  const std::string odd = folder / "odd.mp4";
+  ASSERT_TRUE(write_film(odd, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 1));
+  test::state_pixel_aspect(odd, 5, 2);
+  EXPECT_EQ(stated_pixel_aspect(odd), 1) << "wider than can be corrected";
   FrameSource source = FrameSource::open({path});
   EXPECT_EQ(number_in(*source.next()), 0U) << "the pictures are as before";
   std::ofstream(folder / "broken.mp4") << "no film";

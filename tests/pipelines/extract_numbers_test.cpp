@@ -464,6 +464,12 @@ TEST(PictureTrial, FindsTheShapeOfPixels) {
   ASSERT_TRUE(square && square->survey.found);
   EXPECT_EQ(square->width, std::lround(320 * *proposals[0].options.pixel_aspect));
   EXPECT_NEAR(*ingest::aspect_by_outlines(*square) / aspect, 1, 0.02);
+  ExtractOptions wrong = options;
+  wrong.pixel_aspect = 0.9;
+  const std::vector<Proposal> instead = proposals_for(*look_at_first({{path}}, wrong), wrong, RefusedBy::first_look);
+  ASSERT_EQ(instead.size(), 1U);
+  EXPECT_EQ(instead[0].leave_out, std::vector<std::string>{"--pixel-aspect"});
+  EXPECT_NEAR(*instead[0].options.pixel_aspect / aspect, 1, 0.02);
   const std::optional<Trial> trial = try_options({path}, proposals[0].options);
   ASSERT_TRUE(trial);
   EXPECT_EQ(trial->beads, places.size());
