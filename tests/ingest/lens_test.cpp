@@ -394,6 +394,22 @@ TEST_P(WideScreens, HaveRegionsOfThePictureAsRecorded) {
   EXPECT_EQ(seen, inside);
 }
 
+// All beads lie in the last third, and the region is that third: in pixels of the square picture it would be the middle
+// one, which is empty.
+TEST(Lens, LooksForBeadsInTheRegionOfThePictureAsRecorded) {
+  constexpr double aspect = 64.0 / 45;  // 320 true px are 225 recorded ones
+  std::vector<RenderedDisk> last = bed(320, 300);
+  std::erase_if(last, [](const RenderedDisk& disk) { return disk.x_px < 225; });
+  const GrayFrame frame = seen_by({aspect, 0}, last, 225, 300);
+  MeasureOptions options;
+  options.bead_diameter_m = 16e-3;
+  options.pixel_aspect = aspect;
+  options.find.roi = PixelRectangle{150, 0, 75, 300};
+  const BedFound found = measure_bed({{225, 300, frame.pixels.data(), PixelType::f32}}, options);
+  ASSERT_TRUE(found.ok()) << found.message;
+  EXPECT_EQ(found.measurement.disks.size(), last.size());
+}
+
 INSTANTIATE_TEST_SUITE_P(Lens, WideScreens, testing::Values(64.0 / 45, 1.333, 0.75));
 
 TEST(Lens, BeginsWithWhatAFilmStates) {
