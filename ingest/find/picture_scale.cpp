@@ -48,18 +48,21 @@ GrayFrame doubled(const GrayFrame& frame) {
   twice.width = 2 * frame.width;
   twice.height = 2 * frame.height;
   twice.pixels.resize(static_cast<std::size_t>(twice.width) * static_cast<std::size_t>(twice.height));
+  // Between two pixels; one that is alone is its own neighbour.
+  const auto between = [](double place, int size) { return std::clamp(place, 0.0, std::max(0.0, size - 1.001)); };
+  const int next_column = frame.width > 1 ? 1 : 0, next_row = frame.height > 1 ? 1 : 0;
   for (int row = 0; row < twice.height; ++row) {
-    const double y = std::clamp(0.5 * row - 0.25, 0.0, frame.height - 1.001);
-    const int upper = static_cast<int>(y);
+    const double y = between(0.5 * row - 0.25, frame.height);
+    const int upper = static_cast<int>(y), lower = upper + next_row;
     const float down = static_cast<float>(y - upper);
     for (int column = 0; column < twice.width; ++column) {
-      const double x = std::clamp(0.5 * column - 0.25, 0.0, frame.width - 1.001);
-      const int left = static_cast<int>(x);
+      const double x = between(0.5 * column - 0.25, frame.width);
+      const int left = static_cast<int>(x), right = left + next_column;
       const float along = static_cast<float>(x - left);
       twice.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(twice.width) +
                    static_cast<std::size_t>(column)] =
-          (1 - down) * ((1 - along) * frame.at(left, upper) + along * frame.at(left + 1, upper)) +
-          down * ((1 - along) * frame.at(left, upper + 1) + along * frame.at(left + 1, upper + 1));
+          (1 - down) * ((1 - along) * frame.at(left, upper) + along * frame.at(right, upper)) +
+          down * ((1 - along) * frame.at(left, lower) + along * frame.at(right, lower));
     }
   }
   return twice;

@@ -166,6 +166,21 @@ TEST(Edges, AreOnePixelThick) {
 
 // --- picture_scale.hpp, picture_parts.hpp, smooth_field.hpp ----------------------------------------------------------
 
+// A row or a column that is alone is its own neighbour: nothing beyond it is read.
+TEST(PictureScale, OfALineIsALine) {
+  const GrayFrame line{1, 3, {10, 20, 40}}, twice = doubled(line);
+  ASSERT_EQ(twice.width, 2);
+  ASSERT_EQ(twice.height, 6);
+  const double down[] = {10, 12.5, 17.5, 25, 35, 40};
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 2; ++column)
+      EXPECT_NEAR(static_cast<double>(twice.at(column, row)), down[row], 0.03) << row;
+  const GrayFrame across = doubled(GrayFrame{3, 1, {10, 20, 40}});
+  for (int column = 0; column < 6; ++column)
+    for (int row = 0; row < 2; ++row)
+      EXPECT_NEAR(static_cast<double>(across.at(column, row)), down[column], 0.03) << column;
+}
+
 TEST(PictureScale, OfARampIsARamp) {
   const auto ramp = [](double x, double y) { return 20 + 3 * x - 2 * y; };
   const GrayFrame frame = frame_by(12, 9, ramp);
