@@ -198,8 +198,7 @@ std::string_view to_string(FindStatus status) {
 }
 
 std::optional<FindOptions> search_after_survey(const MeasureOptions& measure) {
-  if (measure.scale_m_per_px || measure.second_diameter_m || measure.pixel_aspect || measure.lens_radial ||
-      measure.first_pixel_aspect != 1)
+  if (measure.scale_m_per_px || measure.second_diameter_m || measure.pixel_aspect || measure.lens_radial)
     return std::nullopt;
   return measure.find;
 }
@@ -213,6 +212,7 @@ Survey survey_with_square_pixels(ChannelFrames& frames, SurveyOptions options, d
     one.frame.enlargement = enlargement;
   }
   if (options.roi) options.roi = widened(*options.roi, pixel_aspect);
+  options.search.reset();  // the search makes pixels square by itself
   Survey survey = take_survey(frames, options);
   for (SurveyCandidate& candidate : survey.candidates)
     if (candidate.region) candidate.region = widened(*candidate.region, 1 / pixel_aspect);
@@ -384,7 +384,6 @@ BedFound measure_bed(const std::vector<std::string>& paths, const MeasureOptions
     const std::vector<FrameOrigin> pictures = names.first_origins(most_tried);
     if (measure.first_pixel_aspect == 1 && !pictures.empty())
       measure.first_pixel_aspect = stated_pixel_aspect(pictures.front().path);
-    if (aspect_assumed(measure) != 1) asked.search.reset();
     const auto look = look_at_first(pictures, asked, source, aspect_assumed(measure));
     if (look && !look->survey.found)
       return refused(FindStatus::no_beads, look->path + ": no beads: " + look->survey.why_not);

@@ -81,8 +81,8 @@ UsedLook use_first_look(const ExtractOptions& options, RunContext& context,
   require_inside(options, *look);
   if (look->pixel_aspect != 1 && !options.pixel_aspect)
     context.warning(
-        fmt::format("{}: the film states that a pixel is {:.4g} times as wide as high. This is where the "
-                    "search for its shape begins. If it is wrong, give --pixel-aspect 1",
+        fmt::format("{}: the film states that a pixel is {:.4g} times as wide as high. The search for the true ratio "
+                    "begins there. If the film is wrong, give --pixel-aspect 1",
                     look->path, look->pixel_aspect));
   if (!look->survey.found) refuse(options, context, *look, pictures, "no beads: " + look->survey.why_not);
   const ingest::SurveyCandidate* chosen = &chosen_of(look->survey, options);

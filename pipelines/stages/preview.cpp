@@ -134,8 +134,7 @@ std::optional<FirstLook> look_at_first(const std::vector<ingest::FrameOrigin>& p
   if (!pixel_aspect) pixel_aspect = ingest::stated_pixel_aspect(pictures.front().path);
   ingest::SurveyOptions asked = survey_asked_for(options);
   asked.channel_alone = purpose == LookFor::preview;
-  if (purpose == LookFor::search && !options.reduction && *pixel_aspect == 1)
-    asked.search = ingest::search_after_survey(asked_for(options));
+  if (purpose == LookFor::search && !options.reduction) asked.search = ingest::search_after_survey(asked_for(options));
   ingest::FrameSourceOptions source;
   source.channel = channel_of(options.channel);
   return ingest::look_at_first(pictures, asked, source, *pixel_aspect);

@@ -161,7 +161,9 @@ class Proposer {
     constexpr double clearly = 0.06;
     constexpr std::size_t enough_pixels = 2'000'000;
     try {
-      const ingest::ChannelFrames frames = ingest::read_channels(look_.path, look_.page, enough_pixels);
+      ingest::FrameSourceOptions source;
+      source.channel = ingest::Channel::grey;
+      const ingest::ChannelFrames frames = ingest::read_channels(look_.path, look_.page, enough_pixels, source);
       const std::optional<double> aspect = ingest::aspect_for_round_outlines(frames.channels.front().frame);
       const bool clear = aspect && std::abs(std::log(*aspect / look_.pixel_aspect)) > clearly;
       return clear && is_possible(*aspect) ? aspect : std::nullopt;

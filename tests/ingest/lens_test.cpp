@@ -364,7 +364,9 @@ TEST_P(WideScreens, AreCorrectedFromNearby) {
   const BedCalibration& bed = found.measurement.calibration;
   EXPECT_NEAR(bed.lens.pixel_aspect / screen.aspect, 1, 0.01);
   EXPECT_NEAR(bed.lens.pixel_aspect, screen.aspect, 2 * bed.aspect_std_error);
-  EXPECT_LT(bed.aspect_std_error / screen.aspect, 0.01);
+  // It is mostly what blur does.
+  const double blur = bed.edge_width_px / bed.radius_px, square = screen.aspect * screen.aspect;
+  EXPECT_NEAR(bed.aspect_std_error / (screen.aspect * 2 * blur * blur * std::abs(square - 1)), 1, 0.15);
   ASSERT_TRUE(screen.off(found));
   EXPECT_LT(*screen.off(found), 0.3);
 }
