@@ -417,8 +417,10 @@ SurveyCandidate settle_channel(const ChannelFrames& frames, const SurveyCandidat
   settled.searched = most.searched;
   const bool plain = most.plain();
   std::vector<OtherChannel> others = others_worth_a_trial(frames, first->frame, best, options, most);
+  // A quick search may show fewer rims there, and a thorough one more: where beads are missed here.
+  const bool by_faces_alone = most.missed <= hardly;
   const auto tried_in = [&](const OtherChannel& other) {
-    return trials.trial_in(*other.frame, other.polarity, Shades::all, !other.shows_more);
+    return trials.trial_in(*other.frame, other.polarity, Shades::all, by_faces_alone && !other.shows_more);
   };
   std::vector<Trial> of_others(others.size());  // unless this channel is plain: hardly another is tried then
   if (!plain) for_each_piece(others.size(), [&](std::size_t k) { of_others[k] = tried_in(others[k]); });

@@ -2,6 +2,7 @@
 // region.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -134,6 +135,47 @@ GrayFrame rings_of(const std::vector<RenderedDisk>& disks) {
   std::vector<RenderedDisk> inside = disks;
   for (RenderedDisk& disk : inside) disk.radius_px -= 2;
   return sum_of(test::beads_of_level(disks, 70), test::beads_of_level(inside, 230));
+}
+
+// Of each bead the left is brighter than the background and the right darker; in between, in `hidden` of all
+// directions, it does not show.
+GrayFrame two_shades(const std::vector<RenderedDisk>& disks, double hidden) {
+  GrayFrame frame = test::beads_of_level(disks, 230), dark = test::beads_of_level(disks, 90);
+  for (int row = 0; row < frame.height; ++row)
+    for (int column = 0; column < frame.width; ++column) {
+      const auto nearest = std::min_element(disks.begin(), disks.end(), [&](const auto& one, const auto& other) {
+        return std::hypot(one.x_px - column, one.y_px - row) < std::hypot(other.x_px - column, other.y_px - row);
+      });
+      const double x = column - nearest->x_px, y = row - nearest->y_px,
+                   steep = std::tan(std::acos(-1) / 2 * (1 - hidden));
+      const auto at = static_cast<std::size_t>(row * frame.width + column);
+      if (std::abs(y) > steep * std::abs(x))
+        frame.pixels[at] = 150;
+      else if (x > 0)
+        frame.pixels[at] = dark.pixels[at];
+    }
+  return frame;
+}
+
+// Red shows the rims of 14 of 20 beads, and of the others a quarter. Green shows all of them, with edges up and down: a
+// quick search finds fewer there than in red, and a thorough one finds all.
+TEST(ChannelTrials, LeaveRimsThatMissManyForThoseOfAThoroughSearch) {
+  const std::vector<RenderedDisk> all = beads_of_trial(), seen(all.begin(), all.begin() + 14);
+  TrialFrames frames(seen, {}, 230);
+  GrayFrame quarters = rings_of({all.begin() + 14, all.end()});
+  for (int row = 0; row < quarters.height; ++row)
+    for (int column = 0; column < quarters.width; ++column)
+      if (std::none_of(all.begin() + 14, all.end(), [&](const RenderedDisk& disk) {
+            return column > disk.x_px && row > disk.y_px && std::hypot(disk.x_px - column, disk.y_px - row) < 12;
+          }))
+        quarters.pixels[static_cast<std::size_t>(row * quarters.width + column)] = 150;
+  frames.frames.channels[0].frame = sum_of(rings_of(seen), quarters);
+  frames.frames.channels[1].frame = two_shades(all, 0.4);
+  const SurveyCandidate settled = frames.settled();
+  EXPECT_EQ(settled.channel, Channel::green);
+  EXPECT_TRUE(settled.thorough);
+  frames.frames.channels[0].frame = rings_of(all);
+  EXPECT_EQ(frames.settled().channel, Channel::red) << "none is missed";
 }
 
 // What a search of the frame finds is taken once, by whoever searches the same levels with the same options.
