@@ -342,12 +342,11 @@ class Bench:
         objects_of = lambda output: [word for word in self.links[output].split() if word.endswith(".o")]
         self.groups = {"libimage_stages": objects_of("pipelines/libshakebed_images.so"),
                        "libprogram": objects_of("pipelines/shakebed")}
-        for name, objects in self.shared.values():
-            self.library(name, objects)
-        for name, objects in self.groups.items():
-            if name == "libprogram":
-                objects = [self.compile_again(one, lambda text: text.replace("-fPIE", "-fPIC")) for one in objects]
-            self.library(name, objects)
+        if not first.exists():
+            of_program = [self.compile_again(one, lambda text: text.replace("-fPIE", "-fPIC"))
+                          for one in self.groups["libprogram"]]
+            self.link_libraries([*self.shared.values(), ("libimage_stages", self.groups["libimage_stages"]),
+                                 ("libprogram", of_program)])
         self.no_fault()
         for output in self.links:
             if output in targets or output.endswith("/libshakebed_images.so"):
@@ -392,11 +391,18 @@ class Bench:
             elif self.in_source(line.strip()):
                 self.depends.setdefault(self.in_source(line.strip()), []).append(output)
 
-    def library(self, name, objects):
-        target = self.work / f"lib/{name}.so"
-        if not target.exists():
-            self.must(["c++", "-shared", "-o", str(target), f"-Wl,-soname,{name}.so", *objects, "-Wl,--as-needed",
-                       *self.others()])
+    def link_libraries(self, libraries):
+        """Twice: each names those whose functions it calls, for a fault brings libraries into programs that have not
+        all of these."""
+        made = []
+        for _ in range(2):
+            for name, objects in libraries:
+                self.must(["c++", "-shared", "-o", f"{self.work}/lib/{name}.new", f"-Wl,-soname,{name}.so", *objects,
+                           "-Wl,--as-needed", *(one for one in made if not one.endswith(f"/{name}.so")),
+                           *self.others(), f"-Wl,-rpath,{self.work}/lib"])
+            for name, _ in libraries:
+                os.replace(f"{self.work}/lib/{name}.new", f"{self.work}/lib/{name}.so")
+            made = [f"{self.work}/lib/{name}.so" for name, _ in libraries]
 
     def others(self):
         """Libraries of others, as the programs name them."""
@@ -542,15 +548,24 @@ class Bench:
                             "--gtest_filter=" + ":".join(tests)], 600 + 60 * usual, cpu_seconds=20 + int(4 * usual),
                            cwd=self.work / "bin")
 
+    def without_fault(self, row, ask):
+        """What `ask` says without the fault. A file that is compiled alone may round differently from one that is compiled
+        with others: with `row` its file takes the place of the fault, as it is."""
+        aside = self.fault.with_suffix(".aside")
+        os.replace(self.fault, aside)
+        self.no_fault()
+        if row is not None and row["file"].endswith(".cpp"):
+            shutil.copy(SOURCE / row["file"], self.overlay / row["file"])
+            self.build(row["file"])
+        said = ask()
+        os.replace(aside, self.fault)
+        return said
+
     def is_fit(self, program, test, usual):
         """Whether a test that failed passes without the fault. Asked once a test."""
         if test not in self.fit:
-            aside = self.fault.with_suffix(".aside")
-            os.replace(self.fault, aside)
-            self.no_fault()
-            code, _, cpu = self.start(program, [test], usual, sound=True)
+            code, _, cpu = self.without_fault(None, lambda: self.start(program, [test], usual, sound=True))
             self.cpu += cpu
-            os.replace(aside, self.fault)
             (self.fit if code == 0 else self.unfit).add(test)
         return test in self.fit
 
@@ -584,21 +599,23 @@ class Bench:
                 return "survived the long tests", f"{name} and what follows were not asked"
             if name in self.unfit:
                 continue
-            code, _, cpu = run_limited(command, 600 + 60 * usual, cwd=self.work / "bin")
-            self.cpu += cpu
-            if code in (0, 77):
+            asked = functools.partial(self.passes, command, usual)
+            if asked():
                 continue
-            aside = self.fault.with_suffix(".aside")
-            os.replace(self.fault, aside)
-            self.no_fault()
-            code, _, cpu = run_limited(command, 600 + 60 * usual, cwd=self.work / "bin")
-            self.cpu += cpu
-            os.replace(aside, self.fault)
-            if code in (0, 77):
+            if self.without_fault(row, asked):
                 return "noticed by a long test", name
-            self.unfit.add(name)
-            print(f"{name} fails without a fault: not used", flush=True)
+            print(f"{name} fails without the fault: not used", flush=True)
+            if not self.without_fault(None, asked):
+                self.unfit.add(name)
         return "survived the long tests", ""
+
+    def passes(self, command, usual):
+        """Whether it ends well, or is skipped. `usual`: the CPU seconds that it takes."""
+        code, output, cpu = run_limited(command, 600 + 60 * usual, cwd=self.work / "bin")
+        self.cpu += cpu
+        if "symbol lookup error" in output:
+            sys.exit(f"{command} is not loaded:\n{output[-3000:]}")
+        return code in (0, 77)
 
     def ask(self, row, times, part):
         if part == "long":
@@ -627,7 +644,7 @@ class Bench:
         likely = RECORDED[row["room"]]
         others = [group for group in quick_records(self.base) if group not in likely]
         for groups in ([likely] if part in ("first", "all") else []) + ([others] if part in ("rest", "all") else []):
-            changed = self.changed_record(groups)
+            changed = self.changed_record(row, groups)
             if changed:
                 return "noticed", changed
         if part == "first":
@@ -642,26 +659,17 @@ class Bench:
 
     def record_is_same(self, group):
         tools = self.work / "bin"
-        code, _, cpu = run_limited(["python3", str(SOURCE / "tests/recorded/recorded.py"), "--tools", str(tools),
-                                    str(tools / "shakebed"), group], 900, cwd=tools)
-        self.cpu += cpu
-        return code == 0
+        return self.passes(["python3", str(SOURCE / "tests/recorded/recorded.py"), "--tools", str(tools),
+                            str(tools / "shakebed"), group], 5)
 
-    def changed_record(self, groups):
+    def changed_record(self, row, groups):
         """The first group of recorded results that a fault changes, and that is as recorded without it; "" for none."""
         for group in groups:
-            name = f"recorded.{group}"
-            if name in self.unfit or self.record_is_same(group):
+            if self.record_is_same(group):
                 continue
-            if name not in self.fit:
-                aside = self.fault.with_suffix(".aside")
-                os.replace(self.fault, aside)
-                self.no_fault()
-                (self.fit if self.record_is_same(group) else self.unfit).add(name)
-                os.replace(aside, self.fault)
-            if name in self.fit:
-                return name
-            print(f"{name} differs without a fault: not used", flush=True)
+            if self.without_fault(row, functools.partial(self.record_is_same, group)):
+                return f"recorded.{group}"
+            print(f"recorded.{group} differs without the fault: not used", flush=True)
         return ""
 
 
