@@ -16,6 +16,7 @@
 #include "ingest/find/nearby.hpp"
 #include "ingest/find/other_shade.hpp"
 #include "ingest/find/packed_bed.hpp"
+#include "ingest/find/rim_line.hpp"
 #include "ingest/find/rim_shape.hpp"
 
 namespace shakebed::ingest {
@@ -396,6 +397,19 @@ struct RimsOfFrame {
   RimsFound found;
 };
 
+// A line along the rims has two edges; its outer one is the outline.
+void take_outer_edge(const GrayFrame& frame, const RimModel& model, const RimsFound& seen,
+                     FinderCalibration& calibration) {
+  std::vector<Circle> circles;
+  for (const RimDisk& disk : seen.disks)
+    if (!disk.other_size) circles.push_back(disk.circle);
+  const std::optional<LineAtRim> line =
+      line_at_rim(frame, circles, circles_of(seen.disks), model.open_radius_px, model.polarity);
+  if (!line) return;
+  calibration.radius_px = calibration.rim_radius_px = line->outer_px;
+  calibration.radius_std_error_px = line->std_error_px;
+}
+
 CalibrationResult calibration_by_rims(MapsOfFrame& maps, const RimsOfFrame& of, const FindOptions& options) {
   const auto& [rims, seen] = of;
   CalibrationResult result;
@@ -416,6 +430,7 @@ CalibrationResult calibration_by_rims(MapsOfFrame& maps, const RimsOfFrame& of, 
   calibration.rims = rims.model;
   calibration.by_rims = true;
   calibration.expected_missed = share_missed_of(maps.quick, rims.model, seen, options.roi);
+  take_outer_edge(maps.frame, rims.model, seen, calibration);
   warn_of_poor_rims(rims, seen, calibration);
   result.found = !rims.disks.empty();
   result.in_last_frame = disks_of(seen, calibration, options);

@@ -11,6 +11,7 @@
 #include "ingest/find/bed_light.hpp"
 #include "ingest/find/candidates.hpp"
 #include "ingest/find/learned_beads.hpp"
+#include "ingest/find/rim_line.hpp"
 
 namespace shakebed::ingest {
 
@@ -303,12 +304,28 @@ class RadiusFromRims {
   std::optional<RimFit> in_light_;  // the radius if the camera encodes, while that is not settled
 };
 
+// A face may end at the inner edge of a line along the rim. Where the radius is known it is left as it is.
+void take_outer_edge(FinderCalibration& calibration, const LearnedBeads& beads) {
+  constexpr double hardly_known = 0.03, far_from_known = 0.05;
+  std::vector<Circle> circles;
+  for (const ModelDisk& disk : beads.disks.front()) circles.push_back({disk.x, disk.y, calibration.radius_px});
+  const auto line = line_at_rim(beads.seen.front(), circles, circles, calibration.radius_px, calibration.polarity);
+  if (!line || (calibration.radius_std_error_px < hardly_known * calibration.radius_px &&
+                std::abs(line->outer_px / calibration.radius_px - 1) < far_from_known))
+    return;
+  calibration.radius_px = line->outer_px;
+  calibration.radius_std_error_px = line->std_error_px;
+  calibration.radius_of_all_rims = false;
+}
+
 }  // namespace
 
 void tell_radius(CalibrationResult& result) {
   if (!result.found || !result.beads || result.beads->noted) return;
   result.beads->noted = true;
-  RadiusFromRims(result.calibration, *result.beads).find();
+  FinderCalibration& calibration = result.calibration;
+  RadiusFromRims(calibration, *result.beads).find();
+  if (!result.beads->hold_radius) take_outer_edge(calibration, *result.beads);
 }
 
 void RadiusFromFrames::add(const FindResult& found) {

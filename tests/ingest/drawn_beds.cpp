@@ -506,4 +506,155 @@ BedScore score_of(const std::vector<FoundDisk>& disks, const std::vector<DrawnBe
   return score;
 }
 
+namespace {
+
+using Colour = std::array<double, 3>;  // red, green, blue
+
+// Hue from 0 to 1, saturation from 0 to 1, and the largest of the three levels.
+Colour coloured(double hue, double saturation, double value) {
+  Colour colour{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double turned = hue + (3.0 - static_cast<double>(c)) / 3, from = 6 * (turned - std::floor(turned));
+    colour[c] = value * (1 - saturation * std::clamp(std::min(from, 6 - from) - 1, 0.0, 1.0));
+  }
+  return colour;
+}
+Colour times(Colour colour, double factor) {
+  for (double& level : colour) level *= factor;
+  return colour;
+}
+double brightness(const Colour& colour) { return 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2]; }
+
+struct ColouredScene {
+  Scene scene;
+  Colour background{}, slope{};  // slope: of the light from left to right, relative, over the frame
+  std::function<Colour(const DrawnBead& bead, double u, double v)> face;
+};
+
+ColouredBed photographed_in_colour(std::mt19937& random, const ColouredScene& coloured,
+                                   const std::vector<DrawnBead>& beads) {
+  ColouredBed drawn;
+  for (std::size_t c = 0; c < 3; ++c) {
+    Scene scene = coloured.scene;
+    scene.background = coloured.background[c], scene.slope_x = coloured.slope[c];
+    scene.face = [&](const DrawnBead& bead, double u, double v) { return coloured.face(bead, u, v)[c]; };
+    DrawnBed seen = photographed(random, scene, beads);
+    drawn.channels[c] = std::move(seen.frame), drawn.beads = std::move(seen.beads);
+  }
+  return drawn;
+}
+
+std::vector<DrawnBead> piled_or_strewn(std::mt19937& random, const Scene& scene) {
+  const RadiusOf radius_of = one_size(random);
+  return random() % 2 == 0 ? pile(random, scene, radius_of) : strewn(random, scene, radius_of, 1.1, 70);
+}
+
+ColouredBed on_another_colour(std::mt19937& random, bool as_bright) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  const double hue = uniform(random, 0, 1), further = uniform(random, 0.25, 0.75);
+  const double saturation = uniform(random, 0.5, 0.9), value = uniform(random, 110, 160);
+  drawn.background = coloured(hue, uniform(random, 0.2, 0.6), uniform(random, 130, 220));
+  Colour bead = coloured(hue + further, saturation, value);
+  if (as_bright) bead = times(bead, brightness(drawn.background) / brightness(bead));
+  drawn.face = [=](const DrawnBead&, double, double) { return bead; };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+ColouredBed of_many_colours(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  const double grey = random() % 2 == 0 ? uniform(random, 20, 60) : uniform(random, 190, 235);
+  drawn.background = {grey, grey, grey};
+  drawn.face = [](const DrawnBead& bead, double, double) { return coloured(own(bead, 7), 0.8, 190); };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+ColouredBed of_two_halves(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  const double hue = uniform(random, 0, 1), further = uniform(random, 0.3, 0.5), grey = uniform(random, 200, 240);
+  drawn.background = {grey, grey, grey};
+  drawn.face = [=](const DrawnBead& bead, double u, double v) {
+    const double angle = 2 * std::numbers::pi * own(bead, 8);
+    return coloured(u * std::cos(angle) + v * std::sin(angle) > 0 ? hue : hue + further, 0.8, 180);
+  };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+// Spheres with a highlight, darker towards their rims, of one colour or many.
+ColouredBed of_glossy_spheres(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  const bool many = random() % 2 == 0, bright = random() % 2 == 0;
+  const double hue = uniform(random, 0, 1), grey = bright ? uniform(random, 215, 245) : uniform(random, 5, 25);
+  drawn.background = {grey, grey, grey};
+  drawn.face = [=](const DrawnBead& bead, double u, double v) {
+    if (std::hypot(u + 0.3, v + 0.35) < 0.18) return Colour{250, 250, 250};
+    const double facing = std::sqrt(std::max(0.0, 1 - u * u - v * v));
+    return times(coloured(many ? own(bead, 7) : hue, 0.75, 210), 0.45 + 0.55 * facing);
+  };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+// Faces of nearly the colour behind them, with a dark line at the rim.
+ColouredBed of_outlines(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  const double hue = uniform(random, 0, 1), line = uniform(random, 1.5, 3);
+  drawn.background = coloured(hue, 0.25, 215);
+  const Colour face = coloured(hue, 0.3, 205), rim = coloured(hue + 0.5, 0.5, 60);
+  drawn.face = [=](const DrawnBead& bead, double u, double v) {
+    return std::hypot(u, v) > 1 - line / bead.radius ? rim : face;
+  };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+// Grey beads in light that is warm at one side and cold at the other.
+ColouredBed in_coloured_light(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  const double turn = uniform(random, 0.3, 0.7);
+  drawn.background = {150, 150, 150}, drawn.slope = {turn, 0, -turn};
+  drawn.face = [](const DrawnBead&, double, double) { return Colour{60, 60, 60}; };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+// Photoelastic disks of two sizes: fringes in green, outlines in red.
+ColouredBed of_photoelastic_disks(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  drawn.background = {150, 25, 15};
+  const FaceOf fringes = fringed(70, 60), clear = clear_disks(140, 15, 70);
+  drawn.face = [=](const DrawnBead& bead, double u, double v) {
+    const double green = own(bead, 6) < 0.6 ? fringes(bead, u, v) : 30;
+    return Colour{clear(bead, u, v), green, 0.5 * green};
+  };
+  const RadiusOf radius_of = two_sizes(uniform(random, 14, 20), 1.3, 0.4);
+  return photographed_in_colour(random, drawn, pile(random, drawn.scene, radius_of));
+}
+
+// As balls of a billiard: a white patch in the middle, with a dark stroke.
+ColouredBed with_labels(std::mt19937& random) {
+  ColouredScene drawn{some_scene(random), {}, {}, {}};
+  drawn.background = coloured(uniform(random, 0.3, 0.6), 0.7, uniform(random, 80, 150));
+  drawn.face = [](const DrawnBead& bead, double u, double v) {
+    const double rho = std::hypot(u - 0.2 * own(bead, 9), v - 0.2 * own(bead, 10));
+    if (rho < 0.4) return std::abs(u - 0.2 * own(bead, 9)) < 0.1 ? Colour{30, 30, 30} : Colour{235, 235, 225};
+    return coloured(own(bead, 7) < 0.8 ? 0.9 * own(bead, 7) : 0.1, 0.85, 60 + 170 * own(bead, 11));
+  };
+  return photographed_in_colour(random, drawn, piled_or_strewn(random, drawn.scene));
+}
+
+}  // namespace
+
+const std::vector<ColouredKind>& coloured_beds() {
+  using Random = std::mt19937;
+  static const std::vector<ColouredKind> kinds = {
+      {"one colour on another", [](Random& r) { return on_another_colour(r, false); }},
+      {"as bright as what is behind", [](Random& r) { return on_another_colour(r, true); }},
+      {"many colours", of_many_colours},
+      {"two halves", of_two_halves},
+      {"glossy spheres", of_glossy_spheres},
+      {"outlines", of_outlines},
+      {"coloured light", in_coloured_light},
+      {"photoelastic disks of two sizes", of_photoelastic_disks},
+      {"labels", with_labels},
+  };
+  return kinds;
+}
+
 }  // namespace shakebed::ingest::test

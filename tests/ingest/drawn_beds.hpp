@@ -2,6 +2,7 @@
 // Drawn photographs of beds whose beads are known: touching beads, beads of two sizes, fringes, poor contrast, shading,
 // beads cut by the border, walls. What is varied within a kind is drawn at random.
 
+#include <array>
 #include <random>
 #include <string>
 #include <vector>
@@ -48,6 +49,17 @@ struct Shaded {
   double blur_px = 0.8, noise = 2;
 };
 DrawnBed bed_of_shades(std::mt19937& random, const Shaded& shaded);
+
+// The same in colour: red, green and blue.
+struct ColouredBed {
+  std::array<GrayFrame, 3> channels;
+  std::vector<DrawnBead> beads;
+};
+struct ColouredKind {
+  std::string name;
+  ColouredBed (*draw)(std::mt19937& random);
+};
+const std::vector<ColouredKind>& coloured_beds();
 
 // Found disks beside the truth. A disk is right when its centre lies within a quarter of the radius of a bead's. Beads
 // that the border cuts count neither as missed nor, when they are found, as wrong.
