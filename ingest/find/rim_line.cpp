@@ -106,9 +106,9 @@ class RaySums {
   // Whether the circles may be those of one of the edges.
   [[nodiscard]] bool followed(double outer, double inner, double depth, Polarity polarity) const {
     const Polarity of_outer = depth < 0 ? Polarity::dark_beads : Polarity::bright_beads;
-    const bool at_outer = radius_ > least_of_outer * outer &&
-                          radius_<most_of_outer * outer, at_inner = radius_> least_of_inner * inner &&
-                          radius_ < most_of_inner * inner;
+    const double to_outer = radius_ / outer, to_inner = radius_ / inner;
+    const bool at_outer = to_outer > least_of_outer && to_outer < most_of_outer;
+    const bool at_inner = to_inner > least_of_inner && to_inner < most_of_inner;
     return polarity == of_outer || polarity == Polarity::automatic ? at_outer : at_inner;
   }
   [[nodiscard]] bool all_show(std::size_t at, double depth) const {

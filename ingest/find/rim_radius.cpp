@@ -304,7 +304,7 @@ class RadiusFromRims {
   std::optional<RimFit> in_light_;  // the radius if the camera encodes, while that is not settled
 };
 
-// A face may end at the inner edge of a line along the rim. Where the radius is known it is left as it is.
+// A face may end at the inner edge of a line along the rim. A radius that is known, and hardly differs, stays.
 void take_outer_edge(FinderCalibration& calibration, const LearnedBeads& beads) {
   constexpr double hardly_known = 0.03, far_from_known = 0.05;
   std::vector<Circle> circles;
