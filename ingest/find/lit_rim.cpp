@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/level_rays.hpp"
 #include "statistics/ranks.hpp"
 
 namespace shakebed::ingest {
@@ -38,21 +38,12 @@ double typical_radius(const std::vector<Circle>& circles) {
 
 // Level along rays from the centre, the mean of the circles whose surroundings are in view.
 cv::Mat mean_rays(const GrayFrame& frame, const std::vector<Circle>& circles, double reach) {
-  const cv::Mat all(frame.height, frame.width, CV_32F, const_cast<float*>(frame.pixels.data()));
-  cv::Mat sum = cv::Mat::zeros(ray_count, ray_steps, CV_32F), rays;
+  cv::Mat sum = cv::Mat::zeros(ray_count, ray_steps, CV_32F);
   const std::size_t stride = 1 + circles.size() / enough_circles;
   int count = 0;
   for (std::size_t k = 0; k < circles.size(); k += stride) {
-    const int left = static_cast<int>(std::floor(circles[k].x - reach)) - 1;
-    const int top = static_cast<int>(std::floor(circles[k].y - reach)) - 1;
-    const int side = static_cast<int>(2 * reach) + 4;
-    if (left < 0 || top < 0 || left + side > frame.width || top + side > frame.height) continue;
-    const cv::Mat around = all(cv::Rect(left, top, side, side));
-    double most = 0;
-    cv::minMaxLoc(around, nullptr, &most);
-    if (unseen(static_cast<float>(most))) continue;
-    const cv::Point2f centre(static_cast<float>(circles[k].x - left), static_cast<float>(circles[k].y - top));
-    cv::warpPolar(around, rays, {ray_steps, ray_count}, centre, reach, cv::INTER_LINEAR);
+    const cv::Mat rays = levels_along_rays(frame, circles[k].x, circles[k].y, {ray_count, ray_steps, reach});
+    if (rays.empty()) continue;
     sum += rays;
     ++count;
   }

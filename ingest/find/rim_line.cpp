@@ -4,9 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 
-#include "ingest/calibrate/solid_borders.hpp"
+#include "ingest/find/level_rays.hpp"
 #include "ingest/find/nearby.hpp"
 
 namespace shakebed::ingest {
@@ -46,6 +45,8 @@ class RaySums {
       : radius_(radius_px), steps_(static_cast<int>(std::ceil(line_reach * radius_px / line_step_px))) {
     for (Sector& sector : sectors_) sector.sum.assign(static_cast<std::size_t>(steps_), 0.0);
   }
+
+  [[nodiscard]] RayGrid grid() const { return {line_rays, steps_, steps_ * line_step_px}; }
 
   // `rays`: levels, a row each, and which of them are free.
   void add(const cv::Mat& rays, const std::array<bool, line_rays>& free) {
@@ -164,25 +165,6 @@ std::array<bool, line_rays> free_rays(const Circle& of, const std::vector<Circle
   return free;
 }
 
-// Levels along rays from a circle's centre, a row each; empty where not all of them are in view.
-cv::Mat levels_along_rays(const GrayFrame& frame, const Circle& circle, double radius_px) {
-  const cv::Mat all(frame.height, frame.width, CV_32F, const_cast<float*>(frame.pixels.data()));
-  const double far = line_reach * radius_px;
-  const int left = static_cast<int>(std::floor(circle.x - far)) - 1,
-            top = static_cast<int>(std::floor(circle.y - far)) - 1, side = static_cast<int>(2 * far) + 4;
-  if (left < 0 || top < 0 || left + side > frame.width || top + side > frame.height) return {};
-  const cv::Mat around = all(cv::Rect(left, top, side, side));
-  double most = 0;
-  cv::minMaxLoc(around, nullptr, &most);
-  if (unseen(static_cast<float>(most))) return {};
-  const int steps = static_cast<int>(std::ceil(far / line_step_px));
-  cv::Mat rays;
-  cv::warpPolar(around, rays, {steps, line_rays},
-                {static_cast<float>(circle.x - left), static_cast<float>(circle.y - top)}, steps * line_step_px,
-                cv::INTER_LINEAR);
-  return rays;
-}
-
 }  // namespace
 
 std::optional<LineAtRim> line_at_rim(const GrayFrame& frame, const std::vector<Circle>& circles,
@@ -191,8 +173,9 @@ std::optional<LineAtRim> line_at_rim(const GrayFrame& frame, const std::vector<C
   const Nearby near(beads.size(), (line_reach + nearest_to_free_ray) * radius_px,
                     [&](std::size_t i) { return std::pair(beads[i].x, beads[i].y); });
   RaySums sums(radius_px);
+  const RayGrid grid = sums.grid();
   for (std::size_t k = 0; k < circles.size(); k += 1 + circles.size() / enough_lines)
-    if (const cv::Mat rays = levels_along_rays(frame, circles[k], radius_px); !rays.empty())
+    if (const cv::Mat rays = levels_along_rays(frame, circles[k].x, circles[k].y, grid); !rays.empty())
       sums.add(rays, free_rays(circles[k], beads, near, radius_px));
   return sums.line(polarity);
 }

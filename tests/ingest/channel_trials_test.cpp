@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -147,7 +148,7 @@ GrayFrame two_shades(const std::vector<RenderedDisk>& disks, double hidden) {
         return std::hypot(one.x_px - column, one.y_px - row) < std::hypot(other.x_px - column, other.y_px - row);
       });
       const double x = column - nearest->x_px, y = row - nearest->y_px,
-                   steep = std::tan(std::acos(-1) / 2 * (1 - hidden));
+                   steep = std::tan(std::numbers::pi / 2 * (1 - hidden));
       const auto at = static_cast<std::size_t>(row * frame.width + column);
       if (std::abs(y) > steep * std::abs(x))
         frame.pixels[at] = 150;

@@ -86,6 +86,24 @@ TEST(RimLine, ItsOuterEdgeIsTheOutline) {
       }
 }
 
+// A bright line on black, and circles of the other signs.
+TEST(RimLine, OfAPictureTurnedIntoItsNegativeIsTheSame) {
+  for (const double found : {15.1, 11.0}) {
+    const Outlined beads = outlined(strewn(), 3, behind_level - 40, 0.8, found);
+    GrayFrame negative = beads.frame;
+    for (float& level : negative.pixels) level = 255 - level;
+    const bool outer = found > 14;
+    const auto dark = line_at_rim(beads.frame, beads.circles, beads.circles, found,
+                                  outer ? Polarity::dark_beads : Polarity::bright_beads);
+    const auto bright = line_at_rim(negative, beads.circles, beads.circles, found,
+                                    outer ? Polarity::bright_beads : Polarity::dark_beads);
+    ASSERT_TRUE(dark && bright);
+    EXPECT_NEAR(bright->outer_px, dark->outer_px, 1e-3);
+    EXPECT_FALSE(line_at_rim(negative, beads.circles, beads.circles, found,
+                             outer ? Polarity::dark_beads : Polarity::bright_beads));
+  }
+}
+
 TEST(RimLine, OfAPackingIsSeenAtItsBorder) {
   const Outlined beads = outlined(packed(), 3, behind_level, 0.8, 11.5);
   const auto seen = line_at_rim(beads.frame, beads.circles, beads.circles, 11.5, Polarity::bright_beads);
